@@ -1,0 +1,290 @@
+"""The occupancy map: which pixels are free, and where they lie in the world."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from math import cos, isfinite, sin
+from os import PathLike
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import MapError, TaskError
+from .segments import segment_is_free
+
+if TYPE_CHECKING:
+    from .mapfiles import MapOptions
+
+#: Longest side of a map, in pixels. Larger files are refused before memory is spent on them.
+MAX_SIDE = 16384
+
+
+class Affine(NamedTuple):
+    """The map (x, y) -> (a x + b y + c, d x + e y + f)."""
+
+    a: float
+    b: float
+    c: float
+    d: float
+    e: float
+    f: float
+
+    def __call__(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Apply to points, shape (..., 2)."""
+        x, y = points[..., 0], points[..., 1]
+        return np.stack(
+            (self.a * x + self.b * y + self.c, self.d * x + self.e * y + self.f), axis=-1
+        )
+
+
+class GridMap:
+    """A 2-D occupancy map with its world frame.
+
+    Pixel coordinates (u, v) are continuous, u to the right and v down from the upper left corner
+    of the map; the point (u, v) lies in the pixel of column floor(u) and row floor(v).
+
+    World coordinates (x, y) are what every other part of the package takes and returns:
+
+    * without ``origin`` (images, arrays, MovingAI maps): x right, y down, (0, 0) at the upper left
+      corner, one pixel is ``resolution`` long;
+    * with ``origin=(x, y, yaw)`` (ROS): y up, ``origin`` is the pose of the lower left corner of
+      the map in the world, lengths in metres, yaw in radians, counter-clockwise.
+
+    Args:
+        free: shape (H, W), row 0 on top; true or non-zero where the robot may be.
+        resolution: world units per pixel.
+        origin: pose of the lower left corner for maps in the ROS frame.
+        name: what the map is called in messages and results.
+
+    Raises:
+        MapError: not a 2-D array of at least 1 x 1 pixel, longest side above ``MAX_SIDE``, no
+            free pixel, or a resolution or origin that is not finite (resolution also positive).
+    """
+
+    def __init__(
+        self,
+        free: ArrayLike,
+        resolution: float = 1.0,
+        origin: tuple[float, float, float] | None = None,
+        *,
+        name: str = "map",
+    ) -> None:
+        cells = np.asarray(free)
+        if cells.ndim != 2 or cells.size == 0:
+            raise MapError(
+                f"{name}: a map is a 2-D array (H, W) of at least one pixel, "
+                f"this one has shape {cells.shape}"
+            )
+        check_side(cells.shape[1], cells.shape[0], name)
+        if cells.dtype.kind not in "buif":
+            raise MapError(f"{name}: a map holds booleans or numbers, not {cells.dtype}")
+        if cells.dtype.kind == "f" and not np.isfinite(cells).all():
+            raise MapError(f"{name}: the map holds NaN or infinite values")
+        if not isfinite(resolution) or resolution <= 0:
+            raise MapError(
+                f"{name}: resolution is the length of a pixel in world units and must be "
+                f"positive, got {resolution}"
+            )
+        if origin is not None and (len(origin) != 3 or not all(isfinite(o) for o in origin)):
+            raise MapError(f"{name}: origin is (x, y, yaw) with finite numbers, got {origin}")
+        self.free: NDArray[np.bool_] = np.ascontiguousarray(cells != 0)
+        if not self.free.any():
+            raise MapError(f"{name}: every pixel is blocked, there is nowhere to plan")
+        self.free.setflags(write=False)
+        self.resolution = float(resolution)
+        self.origin = None if origin is None else (float(origin[0]), float(origin[1]), float(origin[2]))
+        self.name = name
+
+    @classmethod
+    def load(cls, path: str | PathLike[str], **options: Any) -> GridMap:
+        """Read a map file: PNG, JPG, BMP or PGM image, ROS map_server YAML, or MovingAI ``.map``.
+
+        Args:
+            path: the file; its kind is told by its suffix. ``bundled:NAME`` reads one of the maps
+                that come with the package (see :func:`cbagan_ompl.bundled_maps`).
+            **options: the fields of :class:`cbagan_ompl.mapfiles.MapOptions`, such as
+                ``threshold`` and ``unknown_is_free``.
+
+        Raises:
+            MapError: the file is missing, unreadable, truncated, empty or of an unknown kind.
+        """
+        from .mapfiles import load_map
+
+        return load_map(path, **options)
+
+    @property
+    def width(self) -> int:
+        """Columns."""
+        return int(self.free.shape[1])
+
+    @property
+    def height(self) -> int:
+        """Rows."""
+        return int(self.free.shape[0])
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(rows, columns)."""
+        return self.height, self.width
+
+    @cached_property
+    def cells(self) -> bytes:
+        """The free mask as row-major bytes, 1 where free: the form that scalar checks read."""
+        return self.free.tobytes()
+
+    @cached_property
+    def pixel_from_world(self) -> Affine:
+        """World (x, y) -> pixel (u, v)."""
+        scale = 1 / self.resolution
+        if self.origin is None:
+            return Affine(scale, 0.0, 0.0, 0.0, scale, 0.0)
+        x, y, yaw = self.origin
+        c, s = cos(yaw) * scale, sin(yaw) * scale
+        return Affine(c, s, -(c * x + s * y), s, -c, self.height - s * x + c * y)
+
+    @cached_property
+    def world_from_pixel(self) -> Affine:
+        """Pixel (u, v) -> world (x, y)."""
+        if self.origin is None:
+            return Affine(self.resolution, 0.0, 0.0, 0.0, self.resolution, 0.0)
+        x, y, yaw = self.origin
+        c, s = cos(yaw) * self.resolution, sin(yaw) * self.resolution
+        return Affine(c, s, x - s * self.height, s, -c, y + c * self.height)
+
+    def to_pixel(self, points: ArrayLike) -> NDArray[np.float64]:
+        """World points, shape (..., 2), as continuous pixel coordinates (u, v)."""
+        return self.pixel_from_world(np.asarray(points, dtype=np.float64))
+
+    def to_world(self, pixels: ArrayLike) -> NDArray[np.float64]:
+        """Continuous pixel coordinates (u, v), shape (..., 2), as world points."""
+        return self.world_from_pixel(np.asarray(pixels, dtype=np.float64))
+
+    @property
+    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Lower and upper corner of the world box around the map, each (x, y)."""
+        corners = self.to_world(
+            [(0, 0), (self.width, 0), (0, self.height), (self.width, self.height)]
+        )
+        return corners.min(axis=0), corners.max(axis=0)
+
+    def is_free(self, points: ArrayLike) -> NDArray[np.bool_]:
+        """Whether world points, shape (..., 2), lie in free pixels; outside the map is not free."""
+        pixels = self.to_pixel(points)
+        inside = ((pixels >= 0) & (pixels < (self.width, self.height))).all(axis=-1)
+        columns, rows = np.where(inside[..., None], pixels, 0).astype(np.intp).T
+        result: NDArray[np.bool_] = inside & self.free[rows.T, columns.T]
+        return result
+
+    def path_is_free(self, path: ArrayLike) -> bool:
+        """Whether a polyline of world points, shape (N, 2), stays in free pixels.
+
+        The check is exact (see :func:`cbagan_ompl.segments.segment_is_free`).
+        """
+        pixels = self.to_pixel(path)
+        if len(pixels) == 1:
+            return bool(self.is_free(path).all())
+        return all(
+            segment_is_free(self.cells, self.width, self.height, *start, *end)
+            for start, end in zip(pixels[:-1].tolist(), pixels[1:].tolist(), strict=True)
+        )
+
+    def inflated(self, radius: float) -> GridMap:
+        """The map for a disc-shaped robot, as a map for its centre.
+
+        A pixel stays free when its centre is farther than ``radius`` from the nearest blocked
+        pixel (measured to the border of that pixel along the axes, as by a Euclidean distance
+        transform less half a pixel). The border of the map is no obstacle.
+
+        Args:
+            radius: in world units; 0 returns the map itself.
+
+        Raises:
+            MapError: radius negative or not finite, or nothing stays free.
+        """
+        if not isfinite(radius) or radius < 0:
+            raise MapError(f"the robot radius must be a length of at least 0, got {radius}")
+        if radius == 0 or self.free.all():
+            return self
+        to_blocked = cv2.distanceTransform(
+            self.free.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE
+        )
+        free = to_blocked - 0.5 > radius / self.resolution
+        if not free.any():
+            raise MapError(
+                f"{self.name}: a robot of radius {radius} fits nowhere on this map "
+                f"({self.width} x {self.height} pixels of {self.resolution})"
+            )
+        return GridMap(free, self.resolution, self.origin, name=self.name)
+
+    @cached_property
+    def components(self) -> NDArray[np.int32]:
+        """Label of the connected free part that each pixel belongs to, (H, W); 0 where blocked.
+
+        4-connected, because no motion passes between two obstacles that touch diagonally.
+        """
+        return cv2.connectedComponents(self.free.astype(np.uint8), connectivity=4)[1]
+
+    def check_task(self, start: ArrayLike, goal: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Check that a start and a goal can be planned for, and return them as (2,) arrays.
+
+        Raises:
+            TaskError: one of them is no point, outside the map or in an obstacle, the two are
+                equal, or no path joins them.
+        """
+        ends = self._check_point("start", start), self._check_point("goal", goal)
+        if np.array_equal(*ends):
+            raise TaskError(f"start and goal are the same point {_show(ends[0])}")
+        parts = [self.components[row, column] for column, row in self.to_pixel(ends).astype(np.intp)]
+        if parts[0] != parts[1]:
+            raise TaskError(
+                f"{self.name}: no path joins start {_show(ends[0])} and goal {_show(ends[1])}, "
+                "obstacles separate them; choose both in one connected free part"
+            )
+        return ends
+
+    def _check_point(self, role: str, point: ArrayLike) -> NDArray[np.float64]:
+        try:
+            position = np.asarray(point, dtype=np.float64)
+        except (TypeError, ValueError):
+            position = np.empty(0)
+        if position.shape != (2,) or not np.isfinite(position).all():
+            raise TaskError(f"{role} must be two finite numbers x, y in world units, got {point!r}")
+        column, row = np.floor(self.to_pixel(position)).astype(int)
+        if not (0 <= column < self.width and 0 <= row < self.height):
+            low, high = self.bounds
+            raise TaskError(
+                f"{role} {_show(position)} is outside {self.name}, which spans "
+                f"x {low[0]:g} to {high[0]:g} and y {low[1]:g} to {high[1]:g}"
+            )
+        if not self.free[row, column]:
+            raise TaskError(
+                f"{role} {_show(position)} is in an obstacle of {self.name} "
+                f"(pixel column {column}, row {row}); choose a free point"
+            )
+        return position
+
+    def __repr__(self) -> str:
+        frame = "image frame" if self.origin is None else f"origin {self.origin}"
+        return (
+            f"GridMap({self.name!r}, {self.width} x {self.height} pixels of {self.resolution:g}, "
+            f"{frame}, {self.free.mean():.0%} free)"
+        )
+
+
+def check_side(width: int, height: int, name: str) -> None:
+    """Refuse maps too large to plan on.
+
+    Raises:
+        MapError: a side is longer than :data:`MAX_SIDE`.
+    """
+    if max(width, height) > MAX_SIDE:
+        raise MapError(
+            f"{name}: {width} x {height} pixels; maps up to {MAX_SIDE} pixels a side are "
+            "supported, scale it down first"
+        )
+
+
+def _show(point: NDArray[np.float64]) -> str:
+    return f"({point[0]:g}, {point[1]:g})"
