@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cached_property
 from math import cos, isfinite, sin
 from os import PathLike
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -13,9 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import MapError, TaskError
 from .segments import segment_is_free
-
-if TYPE_CHECKING:
-    from .mapfiles import MapOptions
 
 #: Longest side of a map, in pixels. Larger files are refused before memory is spent on them.
 MAX_SIDE = 16384
@@ -71,7 +68,10 @@ class GridMap:
         *,
         name: str = "map",
     ) -> None:
-        cells = np.asarray(free)
+        try:
+            cells = np.asarray(free)
+        except ValueError as error:  # rows of different lengths
+            raise MapError(f"{name}: a map is a 2-D array (H, W): {error}") from error
         if cells.ndim != 2 or cells.size == 0:
             raise MapError(
                 f"{name}: a map is a 2-D array (H, W) of at least one pixel, "
@@ -94,7 +94,9 @@ class GridMap:
             raise MapError(f"{name}: every pixel is blocked, there is nowhere to plan")
         self.free.setflags(write=False)
         self.resolution = float(resolution)
-        self.origin = None if origin is None else (float(origin[0]), float(origin[1]), float(origin[2]))
+        self.origin = (
+            None if origin is None else (float(origin[0]), float(origin[1]), float(origin[2]))
+        )
         self.name = name
 
     @classmethod
@@ -173,8 +175,8 @@ class GridMap:
         """Whether world points, shape (..., 2), lie in free pixels; outside the map is not free."""
         pixels = self.to_pixel(points)
         inside = ((pixels >= 0) & (pixels < (self.width, self.height))).all(axis=-1)
-        columns, rows = np.where(inside[..., None], pixels, 0).astype(np.intp).T
-        result: NDArray[np.bool_] = inside & self.free[rows.T, columns.T]
+        indices = np.where(inside[..., None], pixels, 0).astype(np.intp)
+        result: NDArray[np.bool_] = inside & self.free[indices[..., 1], indices[..., 0]]
         return result
 
     def path_is_free(self, path: ArrayLike) -> bool:
@@ -193,12 +195,14 @@ class GridMap:
     def inflated(self, radius: float) -> GridMap:
         """The map for a disc-shaped robot, as a map for its centre.
 
-        A pixel stays free when its centre is farther than ``radius`` from the nearest blocked
-        pixel (measured to the border of that pixel along the axes, as by a Euclidean distance
-        transform less half a pixel). The border of the map is no obstacle.
+        Every point of a pixel that stays free is at least ``radius`` away from every point of
+        every blocked pixel (square to square), and every pixel for which that holds stays free.
+        So the robot cannot touch an obstacle wherever in the pixel its centre is; the price is
+        that up to a pixel's diagonal of room is given away. The border of the map is no obstacle.
 
         Args:
-            radius: in world units; 0 returns the map itself.
+            radius: in world units; 0 returns the map itself, any more blocks the pixels that
+                touch an obstacle.
 
         Raises:
             MapError: radius negative or not finite, or nothing stays free.
@@ -207,10 +211,13 @@ class GridMap:
             raise MapError(f"the robot radius must be a length of at least 0, got {radius}")
         if radius == 0 or self.free.all():
             return self
-        to_blocked = cv2.distanceTransform(
-            self.free.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE
-        )
-        free = to_blocked - 0.5 > radius / self.resolution
+        # The gap between two pixels is the distance of their centres with one of them grown by a
+        # pixel all around, so growing the obstacles first makes the distance transform, which
+        # measures between centres, give gaps.
+        grown = cv2.dilate((~self.free).astype(np.uint8), np.ones((3, 3), np.uint8))
+        gap = cv2.distanceTransform(1 - grown, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        # The factor covers the rounding of float32 and of the division: 1.1 / 0.1 is 11 pixels.
+        free = gap >= radius / self.resolution * (1 - 1e-6)
         if not free.any():
             raise MapError(
                 f"{self.name}: a robot of radius {radius} fits nowhere on this map "
@@ -224,9 +231,12 @@ class GridMap:
 
         4-connected, because no motion passes between two obstacles that touch diagonally.
         """
-        return cv2.connectedComponents(self.free.astype(np.uint8), connectivity=4)[1]
+        labels = cv2.connectedComponents(self.free.astype(np.uint8), connectivity=4)[1]
+        return labels.astype(np.int32, copy=False)
 
-    def check_task(self, start: ArrayLike, goal: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def check_task(
+        self, start: ArrayLike, goal: ArrayLike
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Check that a start and a goal can be planned for, and return them as (2,) arrays.
 
         Raises:
@@ -236,7 +246,9 @@ class GridMap:
         ends = self._check_point("start", start), self._check_point("goal", goal)
         if np.array_equal(*ends):
             raise TaskError(f"start and goal are the same point {_show(ends[0])}")
-        parts = [self.components[row, column] for column, row in self.to_pixel(ends).astype(np.intp)]
+        parts = [
+            self.components[row, column] for column, row in self.to_pixel(ends).astype(np.intp)
+        ]
         if parts[0] != parts[1]:
             raise TaskError(
                 f"{self.name}: no path joins start {_show(ends[0])} and goal {_show(ends[1])}, "
@@ -251,13 +263,14 @@ class GridMap:
             position = np.empty(0)
         if position.shape != (2,) or not np.isfinite(position).all():
             raise TaskError(f"{role} must be two finite numbers x, y in world units, got {point!r}")
-        column, row = np.floor(self.to_pixel(position)).astype(int)
+        column, row = np.floor(self.to_pixel(position)).tolist()
         if not (0 <= column < self.width and 0 <= row < self.height):
             low, high = self.bounds
             raise TaskError(
                 f"{role} {_show(position)} is outside {self.name}, which spans "
                 f"x {low[0]:g} to {high[0]:g} and y {low[1]:g} to {high[1]:g}"
             )
+        column, row = int(column), int(row)
         if not self.free[row, column]:
             raise TaskError(
                 f"{role} {_show(position)} is in an obstacle of {self.name} "

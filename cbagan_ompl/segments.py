@@ -8,7 +8,7 @@ from math import floor
 _TIE = 1e-12
 
 
-def segment_is_free(
+def segment_is_free(  # noqa: C901 - the inner loop of every planner, so nothing is factored out
     cells: bytes, width: int, height: int, u0: float, v0: float, u1: float, v1: float
 ) -> bool:
     """Whether every pixel that the segment passes through is free.

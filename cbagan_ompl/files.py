@@ -1,0 +1,33 @@
+"""Reading files whole, with this package's exceptions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from .errors import MapError
+
+
+def read_bytes(path: Path) -> bytes:
+    """The content of a map or task file.
+
+    Raises:
+        MapError: it is missing, a folder, or may not be read.
+    """
+    try:
+        return path.read_bytes()
+    # A path with a NUL character is a ValueError.
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise MapError(f"cannot read {path}: {reason}") from error
+
+
+def read_text(path: Path) -> str:
+    """The content of a text file in UTF-8, with or without byte order mark.
+
+    Raises:
+        MapError: it cannot be read, or is no text.
+    """
+    try:
+        return read_bytes(path).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise MapError(f"{path} is no text file in UTF-8: {error}") from error

@@ -1,0 +1,208 @@
+"""The one place that knows how OMPL's Python bindings differ between versions.
+
+Two generations of wheels are served: 1.7 (Boost.Python) and 2.0 (nanobind). Features are told by
+what the bindings offer, not by version number, so that a build that binds more is used better.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import MissingDependencyError, PlannerError
+
+_OMPL_WAS_LOADED = "ompl.util" in sys.modules
+
+try:
+    import ompl
+except ImportError as error:  # pragma: no cover - ompl is a declared dependency
+    raise MissingDependencyError("this needs OMPL's Python bindings: pip install ompl") from error
+
+#: True for the Boost.Python bindings of OMPL 1.x.
+BOOST_PYTHON = hasattr(ompl, "dll_loader")
+if BOOST_PYTHON and not _OMPL_WAS_LOADED:
+    # ompl.util preloads a second copy of libompl; its static objects are then destroyed twice,
+    # and the interpreter crashes at exit. The first copy is all that is needed.
+    ompl.dll_loader = lambda *_: None
+
+from ompl import base as ob  # noqa: E402
+from ompl import geometric as og  # noqa: E402
+from ompl import util as ou  # noqa: E402
+
+__all__ = ["BOOST_PYTHON", "HAS_STATE_SAMPLER_ALLOCATOR", "ob", "og", "ou"]
+
+#: Whether planners can be given a StateSampler (OMPL 1.7; not bound in 2.0.0 and 2.0.1).
+HAS_STATE_SAMPLER_ALLOCATOR = hasattr(ob.StateSpace, "setStateSamplerAllocator")
+
+#: Planners that never come back from a solve whose termination condition is a Python function.
+HANGS_ON_PYTHON_TERMINATION = frozenset() if BOOST_PYTHON else frozenset({"PRM", "PRMstar"})
+
+
+def ompl_version() -> str:
+    """Version of the installed OMPL package, or "unknown" for a build without metadata."""
+    try:
+        return version("ompl")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def _skip_static_destructors() -> None:
+    """Leave the process right after Python's own shutdown, with its exit status.
+
+    For OMPL 1.x when the script imported ompl before this package: the second copy of libompl is
+    loaded by then, and only skipping the destructors of both copies avoids the crash at exit.
+    glibc calls the handlers last in, first out: C streams are flushed, then ``_exit(status)``.
+    """
+    libc = ctypes.CDLL(None)
+    if hasattr(libc, "on_exit"):
+        for handler in ("_exit", "fcloseall"):
+            libc.on_exit(ctypes.cast(getattr(libc, handler), ctypes.c_void_p), None)
+
+
+if BOOST_PYTHON and _OMPL_WAS_LOADED:
+    _skip_static_destructors()
+
+
+def _wrapped(wrapper: str, function: Callable[..., Any]) -> Any:
+    """Boost.Python wants callbacks in a typed std::function, nanobind takes them as they are."""
+    return getattr(ob, wrapper)(function) if hasattr(ob, wrapper) else function
+
+
+def validity_function(function: Callable[[Any], bool]) -> Any:
+    """What ``setStateValidityChecker`` takes for a Python function."""
+    return _wrapped("StateValidityCheckerFn", function)
+
+
+def state_sampler_allocator(function: Callable[[Any], Any]) -> Any:
+    """What ``StateSpace.setStateSamplerAllocator`` takes."""
+    return _wrapped("StateSamplerAllocator", function)
+
+
+def valid_state_sampler_allocator(function: Callable[[Any], Any]) -> Any:
+    """What ``SpaceInformation.setValidStateSamplerAllocator`` takes."""
+    return _wrapped("ValidStateSamplerAllocator", function)
+
+
+def termination_condition(function: Callable[[], bool]) -> Any:
+    """A planner termination condition that asks a Python function."""
+    return ob.PlannerTerminationCondition(_wrapped("PlannerTerminationConditionFn", function))
+
+
+def plane_space(low: NDArray[np.float64], high: NDArray[np.float64]) -> Any:
+    """A two-dimensional RealVectorStateSpace.
+
+    On OMPL 1.x the space of an SE2StateSpace is taken: one made by C++ needs no look-up of Python
+    overrides at each distance, which more than doubles the iterations of RRT* per second.
+
+    Args:
+        low: lower bounds, shape (2,).
+        high: upper bounds, shape (2,).
+    """
+    bounds = ob.RealVectorBounds(2)
+    for axis in range(2):
+        bounds.setLow(axis, float(low[axis]))
+        bounds.setHigh(axis, float(high[axis]))
+    if not BOOST_PYTHON:
+        space = ob.RealVectorStateSpace(2)
+        space.setBounds(bounds)
+        return space
+    owner = ob.SE2StateSpace()
+    owner.setBounds(bounds)
+    return owner.getSubspace(0)
+
+
+def new_state(space: Any) -> Any:
+    """A state of the space that lives as long as the returned object."""
+    return ob.State(space) if BOOST_PYTHON else space.allocState()
+
+
+def best_cost(planner: Any) -> float:
+    """Cost of the best solution of an RRT*-like planner, infinite before the first one."""
+    return float(planner.bestCost().value())
+
+
+def typed_state(state: Any) -> Any:
+    """The state as callbacks see it, from one made by :func:`new_state`; keep the latter alive."""
+    return state() if BOOST_PYTHON else state
+
+
+def start_states(planner: Any) -> list[Any]:
+    """The start states of a planner that has begun to plan.
+
+    On OMPL 2.0 they are read from the planner's tree: ``ProblemDefinition.getStartState`` hands
+    out an owning pointer there, which is freed twice.
+    """
+    if BOOST_PYTHON:
+        problem = planner.getProblemDefinition()
+        return [problem.getStartState(i) for i in range(problem.getStartStateCount())]
+    data = planner_data(planner)
+    return [data.getStartVertex(i).getState() for i in range(data.numStartVertices())]
+
+
+def clear_valid_state_sampler(si: Any) -> None:
+    """Go back to OMPL's own valid-state sampler."""
+    if BOOST_PYTHON:
+        si.setValidStateSamplerAllocator(valid_state_sampler_allocator(ob.UniformValidStateSampler))
+    else:
+        si.clearValidStateSamplerAllocator()
+
+
+def planner_data(planner: Any) -> Any:
+    """The tree or roadmap of a planner as an ``ob.PlannerData``."""
+    data = ob.PlannerData(planner.getSpaceInformation())
+    planner.getPlannerData(data)
+    return data
+
+
+def planner_class(name: str) -> Any:
+    """The class of a geometric planner by its OMPL name.
+
+    Raises:
+        PlannerError: this build has no such planner.
+    """
+    names = planner_names()
+    if name not in names:
+        raise PlannerError(
+            f"OMPL {ompl_version()} has no planner {name!r}; it has {', '.join(sorted(names))}"
+        )
+    return getattr(og, name)
+
+
+def planner_names() -> frozenset[str]:
+    """Names of the geometric planners of this build."""
+    return frozenset(
+        name
+        for name, value in vars(og).items()
+        if isinstance(value, type) and issubclass(value, ob.Planner) and value is not ob.Planner
+    )
+
+
+def seed_ompl(seed: int) -> None:
+    """Seed OMPL's generators that are made from now on.
+
+    OMPL reports an error when it has drawn numbers before, and reseeds all the same; the report
+    is kept quiet.
+
+    Args:
+        seed: at least 0. OMPL knows no seed 0, so its own is ``seed % (2**32 - 1) + 1``.
+    """
+    with log_level(ou.LOG_NONE):
+        ou.RNG.setSeed(seed % (2**32 - 1) + 1)
+
+
+@contextmanager
+def log_level(level: Any) -> Iterator[None]:
+    """Set OMPL's log level for the duration of a block."""
+    before = ou.getLogLevel()
+    ou.setLogLevel(level)
+    try:
+        yield
+    finally:
+        ou.setLogLevel(before)

@@ -1,0 +1,80 @@
+"""Draws handed to a planner as samples of its goal: the hook where no sampler can be set."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..draws import DrawStream
+from ..errors import PlannerError
+from .compat import ob
+from .positions import Positions
+from .progress import PlannerProgress
+
+# What RRT-like planners compare their number of goal states with: never enough.
+_ENDLESS = 10**9
+
+# Share of draws that are the real goal until the planner has reached it: OMPL's own goal bias.
+_GOAL_BIAS = 0.05
+
+
+class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
+    """A goal that is reached where the original is, and whose samples come from a heat map.
+
+    RRT, RRT*, Informed RRT* and SORRT* sample their goal with the probability of their goal bias
+    and grow the tree towards the sample like towards any other. With that bias at 1 every sample
+    of theirs is a draw of ours.
+
+    Args:
+        si: the space information.
+        original: the goal of the task.
+        positions: access to the positions of the states.
+        stream: the draws.
+        progress: what is known of the planner.
+        seed: seed or generator of the goal bias.
+    """
+
+    def __init__(
+        self,
+        si: Any,
+        original: Any,
+        positions: Positions,
+        stream: DrawStream,
+        progress: PlannerProgress,
+        seed: int | np.random.Generator | None,
+    ) -> None:
+        super().__init__(si)
+        if not isinstance(original, ob.GoalSampleableRegion):
+            raise PlannerError(
+                "goal injection needs a goal that can be sampled, such as a GoalState or "
+                f"GoalStates, this one is a {type(original).__name__}"
+            )
+        self.setThreshold(original.getThreshold())
+        self._original = original
+        self._positions = positions
+        self._stream = stream
+        self._progress = progress
+        self._rng = np.random.default_rng(seed)
+
+    def distanceGoal(self, state: Any) -> float:  # noqa: N802
+        """Distance to the original goal."""
+        return float(self._original.distanceGoal(state))
+
+    def maxSampleCount(self) -> int:  # noqa: N802
+        """No end of samples for the planner, the original's number for anybody else."""
+        return _ENDLESS if self._progress.is_sampling else int(self._original.maxSampleCount())
+
+    def couldSample(self) -> bool:  # noqa: N802
+        """Always, as for the original."""
+        return True
+
+    def sampleGoal(self, state: Any) -> None:  # noqa: N802
+        """A draw for the planner, a sample of the original goal for anybody else."""
+        progress = self._progress
+        sampling = progress.is_sampling
+        progress.note_sample()
+        if not sampling or (not progress.has_solution and self._rng.random() < _GOAL_BIAS):
+            self._original.sampleGoal(state)
+        else:
+            self._positions.write(state, *self._stream.next())

@@ -1,0 +1,317 @@
+"""The whole job in one call: map, heat map, planner, checked path."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields
+from math import inf, isfinite
+from os import PathLike
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..draws import DEFAULT_UNIFORM_FRACTION
+from ..errors import ConfigError
+from ..gridmap import GridMap
+from ..heatmap import Heatmap
+from . import compat
+from .attach import attach
+from .compat import ob, og, ou
+from .validity import GridMotionValidator, GridValidityChecker
+
+if TYPE_CHECKING:
+    from ..network.predictor import Predictor
+
+#: Where the heat map of a plan can come from; "uniform" is OMPL's own sampler, untouched.
+SAMPLERS = ("learned", "uniform", "corridor", "straight-line")
+
+#: What a result names its sampler when the caller brought the heat map.
+OWN_HEATMAP = "heatmap"
+
+
+@dataclass(frozen=True)
+class PlanResult:
+    """What came out of :func:`plan`; lengths in world units, times in seconds.
+
+    Attributes:
+        solved: the planner found an exact solution, and every edge of it passed the check again.
+        status: OMPL's own word on the run.
+        planner: OMPL's name of the planner.
+        sampler: ``"learned"``, ``"uniform"``, ``"corridor"``, ``"straight-line"`` or
+            ``"heatmap"`` (the caller's own).
+        hook: by which hook the planner was reached; None for the uniform sampler.
+        ompl_version: of the installed package.
+        seed: what makes the draws of this run again.
+        map: name of the map.
+        start: (x, y).
+        goal: (x, y).
+        goal_tolerance: how far from the goal a path may end.
+        path: (N, 2); empty when not solved.
+        cost: length of the path; infinite when not solved.
+        inference_s: making the heat map, loading the model not included.
+        planning_s: inside the planner's ``solve``.
+        simplify_s: inside OMPL's path simplifier.
+        total_s: the sum of the three.
+        first_solution_s: planning time to the first solution; None when not solved or the
+            planner does not let it be known.
+        iterations: evaluations of the termination condition, about one per iteration; None for
+            planners that take no Python termination condition.
+        nodes: states in the planner's tree or roadmap.
+        draws: ``{"learned": n, "uniform": m}`` draws that the planner had from the heat map's
+            hook; both 0 for the uniform sampler, which has no hook.
+        heatmap: what was drawn from; None for the uniform sampler. Not part of the JSON.
+        tree: edges of the planner's tree, (M, 2, 2), when asked for. Not part of the JSON.
+    """
+
+    solved: bool
+    status: str
+    planner: str
+    sampler: str
+    hook: str | None
+    ompl_version: str
+    seed: int
+    map: str
+    start: NDArray[np.float64]
+    goal: NDArray[np.float64]
+    goal_tolerance: float
+    path: NDArray[np.float64]
+    cost: float
+    inference_s: float
+    planning_s: float
+    simplify_s: float
+    total_s: float
+    first_solution_s: float | None
+    iterations: int | None
+    nodes: int
+    draws: dict[str, int]
+    heatmap: Heatmap | None = field(repr=False, metadata={"json": False})
+    tree: NDArray[np.float64] | None = field(repr=False, metadata={"json": False})
+
+    def to_dict(self) -> dict[str, Any]:
+        """The result as JSON-ready values; an infinite cost becomes None."""
+        values = {f.name: getattr(self, f.name) for f in fields(self) if f.metadata.get("json", True)}
+        arrays = {k: v.tolist() for k, v in values.items() if isinstance(v, np.ndarray)}
+        return values | arrays | {"cost": self.cost if isfinite(self.cost) else None}
+
+
+def plan(
+    grid: GridMap | str | PathLike[str],
+    start: ArrayLike,
+    goal: ArrayLike,
+    planner: str = "RRTstar",
+    sampler: str = "learned",
+    time: float = 1.0,
+    iterations: int | None = None,
+    range: float | None = None,
+    radius: float = 0.0,
+    seed: int | None = None,
+    uniform_fraction: float = DEFAULT_UNIFORM_FRACTION,
+    model: Predictor | str | PathLike[str] | None = None,
+    heatmap: Heatmap | None = None,
+    simplify: bool = False,
+    *,
+    goal_tolerance: float | None = None,
+    keep_tree: bool = False,
+) -> PlanResult:
+    """Plan a path on a map with one of OMPL's planners, unmodified.
+
+    Args:
+        grid: the map, or a file for :meth:`GridMap.load`.
+        start: (x, y), world.
+        goal: (x, y), world.
+        planner: OMPL's name of a geometric planner, such as ``"RRT"`` or ``"InformedRRTstar"``.
+        sampler: one of :data:`SAMPLERS`; ``"uniform"`` leaves OMPL's own sampler in place.
+        time: limit of the planner's solve, seconds. RRT-like planners stop at their first
+            solution, RRT*-like ones go on to the limit.
+        iterations: limit of the planner's iterations, whichever comes first.
+        range: longest edge that the planner adds, world units; by default OMPL's choice (a
+            fifth of the map's diagonal).
+        radius: of the robot, world units; obstacles are inflated by it.
+        seed: at least 0; seeds OMPL's generators (which are global) and ours. A run limited by
+            ``iterations`` repeats itself, one limited by ``time`` does not. By default a fresh
+            one, found in the result.
+        uniform_fraction: share of draws that stays uniform over free space, in (0, 1].
+        model: for the learned sampler, a loaded model or the file of one; the bundled model by
+            default.
+        heatmap: to be drawn from in place of the learned one, in this map's grid.
+        simplify: let OMPL's path simplifier shorten the path afterwards.
+        goal_tolerance: how far from the goal a path may end, world units; by default a pixel.
+        keep_tree: put the edges of the planner's tree into the result.
+
+    Returns:
+        The result; not finding a path in time is no error, ``solved`` is False then.
+
+    Raises:
+        MapError: an unusable map or radius.
+        TaskError: start or goal outside, in an obstacle, equal, or in separate parts.
+        PlannerError: an unknown planner, or one that no hook reaches on this OMPL.
+        ConfigError: an option that makes no sense.
+        ModelError: an unusable model file.
+        HeatmapError: a heat map that does not belong to this grid.
+    """
+    source = grid if isinstance(grid, GridMap) else GridMap.load(grid)
+    space_map = source.inflated(radius)
+    task = space_map.check_task(start, goal)
+    tolerance = space_map.resolution if goal_tolerance is None else goal_tolerance
+    _check_options(time, iterations, range, tolerance, seed)
+    used_seed = secrets.randbits(32) if seed is None else seed
+    name, provide = _provider(sampler, model, heatmap)
+
+    with compat.log_level(ou.LOG_ERROR):
+        compat.seed_ompl(used_seed)
+        setup = _simple_setup(space_map, task, planner, range, tolerance)
+        began = perf_counter()
+        drawn_from = provide(space_map, *task) if provide is not None else None
+        inference_s = perf_counter() - began if provide is not None else 0.0
+        link = (
+            attach(setup, drawn_from, uniform_fraction, used_seed)
+            if drawn_from is not None
+            else None
+        )
+        try:
+            run = _solve(setup, time, iterations)
+            simplify_s = _simplify(setup) if simplify and run.exact else 0.0
+            path = _checked_path(setup, space_map, task, tolerance) if run.exact else None
+            data = compat.planner_data(setup.getPlanner())
+            return PlanResult(
+                solved=path is not None,
+                status=run.status,
+                planner=planner,
+                sampler=name,
+                hook=link.hook if link else None,
+                ompl_version=compat.ompl_version(),
+                seed=used_seed,
+                map=space_map.name,
+                start=task[0],
+                goal=task[1],
+                goal_tolerance=tolerance,
+                path=np.empty((0, 2)) if path is None else path,
+                cost=inf if path is None else _length(path),
+                inference_s=inference_s,
+                planning_s=run.planning_s,
+                simplify_s=simplify_s,
+                total_s=inference_s + run.planning_s + simplify_s,
+                first_solution_s=run.first_solution_s if path is not None else None,
+                iterations=run.iterations,
+                nodes=int(data.numVertices()),
+                draws=dict(link.draws) if link else {"learned": 0, "uniform": 0},
+                heatmap=drawn_from,
+                tree=_edges(data) if keep_tree else None,
+            )
+        finally:
+            if link is not None:
+                link.detach()
+
+
+def _check_options(
+    time: float, iterations: int | None, range: float | None, tolerance: float, seed: int | None
+) -> None:
+    if not (isfinite(time) and time > 0):
+        raise ConfigError(f"time is the planner's limit in seconds, above 0, got {time}")
+    if iterations is not None and iterations < 1:
+        raise ConfigError(f"iterations must be at least 1, got {iterations}")
+    if range is not None and not (isfinite(range) and range > 0):
+        raise ConfigError(f"range is the longest edge in world units, above 0, got {range}")
+    if not (isfinite(tolerance) and tolerance >= 0):
+        raise ConfigError(f"goal_tolerance is a length of at least 0, got {tolerance}")
+    if seed is not None and seed < 0:
+        raise ConfigError(f"seed must be at least 0, got {seed}")
+
+
+_Provider = Callable[[GridMap, ArrayLike, ArrayLike], Heatmap]
+
+
+def _provider(
+    sampler: str,
+    model: Predictor | str | PathLike[str] | None,
+    heatmap: Heatmap | None,
+) -> tuple[str, _Provider | None]:
+    """Name of the sampler, and what makes its heat map; a model is loaded here, once."""
+    if sampler not in SAMPLERS:
+        raise ConfigError(f"there is no sampler {sampler!r}; there are {', '.join(SAMPLERS)}")
+    if sampler != "learned" and (model is not None or heatmap is not None):
+        raise ConfigError(
+            f"the {sampler} sampler uses no model and no heat map: leave them out, or choose the "
+            "learned sampler"
+        )
+    if model is not None and heatmap is not None:
+        raise ConfigError("a model and a heat map were both given: choose one")
+    if heatmap is not None:
+        given = heatmap
+        return OWN_HEATMAP, lambda grid, start, goal: Heatmap(given.values, grid)
+    if sampler == "uniform":
+        return sampler, None
+    if sampler == "corridor":
+        return sampler, Heatmap.corridor
+    if sampler == "straight-line":
+        return sampler, Heatmap.straight_line
+    from ..network.predictor import Predictor, load_model
+
+    predictor = model if isinstance(model, Predictor) else load_model(model)
+    return sampler, predictor.predict
+
+
+def _simple_setup(
+    grid: GridMap,
+    task: tuple[NDArray[np.float64], NDArray[np.float64]],
+    planner: str,
+    range: float | None,
+    tolerance: float,
+) -> Any:
+    kind = compat.planner_class(planner)
+    space = compat.plane_space(*grid.bounds)
+    setup = og.SimpleSetup(space)
+    si = setup.getSpaceInformation()
+    setup.setStateValidityChecker(GridValidityChecker(si, grid))
+    si.setMotionValidator(GridMotionValidator(si, grid))
+    start, goal = compat.new_state(space), compat.new_state(space)
+    for state, point in ((start, task[0]), (goal, task[1])):
+        state[0], state[1] = float(point[0]), float(point[1])
+    setup.setStartAndGoalStates(start, goal, float(tolerance))
+    instance = kind(si)
+    if range is not None:
+        if not hasattr(instance, "setRange"):
+            raise ConfigError(f"{planner} has no range to set: leave it out")
+        instance.setRange(float(range))
+    setup.setPlanner(instance)
+    setup.setup()
+    return setup
+
+
+@dataclass(frozen=True)
+class _Run:
+    exact: bool
+    status: str
+    planning_s: float
+    first_solution_s: float | None
+    iterations: int | None
+
+
+def _solve(setup: Any, time: float, iterations: int | None) -> _Run:
+    planner = setup.getPlanner()
+    if planner.getName() in compat.HANGS_ON_PYTHON_TERMINATION:
+        return _solve_timed(setup, time, iterations)
+    watches_cost = hasattr(planner, "bestCost")
+    limit = inf if iterations is None else iterations
+    done, first = 0, None
+    began = perf_counter()
+    end = began + time
+
+    def stop() -> bool:
+        nonlocal done, first
+        now = perf_counter()
+        if watches_cost and first is None and compat.best_cost(planner) < inf:
+            first = now - began
+        if done >= limit or now >= end:
+            return True
+        done += 1
+        return False
+
+    status = setup.solve(compat.termination_condition(stop))
+    planning_s = perf_counter() - began
+    if not watches_cost and not _ANYTIME.intersection({planner.getName()}):
+        first = planning_s
+    return _Run(_is_exact(status), str(status), planning_s, first, done)

@@ -1,0 +1,78 @@
+"""Reading and writing the (x, y) of an OMPL state: the only code that knows the kinds of space."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..errors import PlannerError
+from .compat import ob
+
+
+class Positions(Protocol):
+    """Access to the position in the states of one kind of space."""
+
+    def read(self, state: Any) -> tuple[float, float]:
+        """(x, y) of a state."""
+
+    def write(self, state: Any, x: float, y: float) -> None:
+        """Set the position of a state to a draw; anything else in the state becomes uniform."""
+
+
+class PlanePositions:
+    """States of a RealVectorStateSpace of dimension 2."""
+
+    @staticmethod
+    def read(state: Any) -> tuple[float, float]:
+        """(x, y) of a state."""
+        return state[0], state[1]
+
+    @staticmethod
+    def write(state: Any, x: float, y: float) -> None:
+        """Set (x, y)."""
+        state[0] = x
+        state[1] = y
+
+
+class PosePositions:
+    """States of SE2StateSpace and its Dubins and Reeds-Shepp subclasses: the heading is uniform.
+
+    Args:
+        seed: seed or generator of the headings.
+    """
+
+    def __init__(self, seed: int | np.random.Generator | None = None) -> None:
+        self._rng = np.random.default_rng(seed)
+
+    @staticmethod
+    def read(state: Any) -> tuple[float, float]:
+        """(x, y) of a state."""
+        return state.getX(), state.getY()
+
+    def write(self, state: Any, x: float, y: float) -> None:
+        """Set (x, y) and draw a heading."""
+        state.setX(x)
+        state.setY(y)
+        state.setYaw(float(self._rng.uniform(-pi, pi)))
+
+
+def positions_of(space: Any, seed: int | np.random.Generator | None = None) -> Positions:
+    """The access that fits a state space.
+
+    Args:
+        space: an OMPL state space.
+        seed: seed or generator for the parts of a state that the heat map says nothing about.
+
+    Raises:
+        PlannerError: a space whose states have no (x, y) that a 2-D map could speak about.
+    """
+    if isinstance(space, ob.SE2StateSpace):
+        return PosePositions(seed)
+    if isinstance(space, ob.RealVectorStateSpace) and space.getDimension() == 2:
+        return PlanePositions()
+    raise PlannerError(
+        "a 2-D heat map serves RealVectorStateSpace(2), SE2StateSpace, DubinsStateSpace and "
+        f"ReedsSheppStateSpace, not {type(space).__name__} of dimension {space.getDimension()}"
+    )

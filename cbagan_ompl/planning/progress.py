@@ -1,0 +1,99 @@
+"""What callbacks may know of the planner that calls them."""
+
+from __future__ import annotations
+
+import atexit
+import weakref
+from math import inf
+from typing import Any
+
+import numpy as np
+
+from ..draws import InformedSet
+from .compat import best_cost, new_state, ob, start_states, typed_state
+from .positions import Positions
+
+# A goal region without end is represented by this many samples of it in the informed set.
+_MAX_GOALS = 100
+
+
+class PlannerProgress:
+    """The state of a planner, read through the only references that callbacks have to it.
+
+    A callback that refers to its planner closes a reference cycle through C++, which no garbage
+    collector sees. :meth:`release` cuts it; at interpreter exit all are cut, because OMPL 2.0
+    reports every object that is left.
+
+    Args:
+        setup: a SimpleSetup with its planner and its own goal.
+        positions: access to the positions of its states.
+    """
+
+    def __init__(self, setup: Any, positions: Positions) -> None:
+        self._planner = setup.getPlanner()
+        self._problem = setup.getProblemDefinition()
+        self._goal = setup.getGoal()
+        self._positions = positions
+        self._counts_iterations = hasattr(self._planner, "numIterations")
+        self._last_iteration = 0
+        _alive.add(self)
+
+    @property
+    def is_sampling(self) -> bool:
+        """Whether the planner's main loop is asking for a goal, rather than OMPL around it.
+
+        An informed sampler that is being built, and the path simplifier, ask the goal for samples
+        as well, and must get the goal itself. RRT*-like planners count iterations and ask once in
+        each, from 1 on; the others stop at their first solution.
+        """
+        if self._planner is None:
+            return False
+        if self._counts_iterations:
+            return self._planner.numIterations() not in (0, self._last_iteration)
+        return not self._problem.hasExactSolution()
+
+    def note_sample(self) -> None:
+        """Remember the iteration that has had its sample."""
+        if self._counts_iterations and self._planner is not None:
+            self._last_iteration = self._planner.numIterations()
+
+    @property
+    def has_solution(self) -> bool:
+        """Whether a planner that goes on after its first solution has found it."""
+        return self._counts_iterations and self.best_cost() < inf
+
+    def best_cost(self) -> float:
+        """Cost of the best solution, infinite before there is one."""
+        return inf if self._planner is None else best_cost(self._planner)
+
+    def path_length(self) -> float:
+        """The best cost where it is a path length, otherwise infinite."""
+        if self._problem is None or not isinstance(
+            self._problem.getOptimizationObjective(), ob.PathLengthOptimizationObjective
+        ):
+            return inf
+        return self.best_cost()
+
+    def informed_set(self) -> InformedSet:
+        """The informed set of the task, once the planner has begun to plan."""
+        state = new_state(self._planner.getSpaceInformation().getStateSpace())
+        typed = typed_state(state)
+        goals = []
+        for _ in range(min(self._goal.maxSampleCount(), _MAX_GOALS)):
+            self._goal.sampleGoal(typed)
+            goals.append(self._positions.read(typed))
+        starts = [self._positions.read(start) for start in start_states(self._planner)]
+        return InformedSet(np.array(starts), np.array(goals), self._goal.getThreshold())
+
+    def release(self) -> None:
+        """Let go of the planner and its task."""
+        self._planner = self._problem = self._goal = None
+
+
+_alive: weakref.WeakSet[PlannerProgress] = weakref.WeakSet()
+
+
+@atexit.register
+def _release_all() -> None:
+    for progress in list(_alive):
+        progress.release()

@@ -1,0 +1,93 @@
+"""Exact collision checks of a grid map, for OMPL."""
+
+from __future__ import annotations
+
+from math import floor
+from typing import Any
+
+from ..errors import PlannerError
+from ..gridmap import GridMap
+from ..segments import segment_is_free
+from .compat import ob
+from .positions import Positions, positions_of
+
+
+class GridValidityChecker(ob.StateValidityChecker):  # type: ignore[misc]
+    """A state is valid when the pixel that its (x, y) lies in is free.
+
+    Use: ``setup.setStateValidityChecker(GridValidityChecker(setup.getSpaceInformation(), grid))``.
+
+    Args:
+        si: the space information.
+        grid: the map; inflate it first for a robot with a radius.
+
+    Raises:
+        PlannerError: the states of the space have no (x, y).
+    """
+
+    def __init__(self, si: Any, grid: GridMap) -> None:
+        super().__init__(si)
+        self._read = positions_of(si.getStateSpace()).read
+        self._cells, self._width, self._height = grid.cells, grid.width, grid.height
+        self._affine = tuple(grid.pixel_from_world)
+
+    def isValid(self, state: Any) -> bool:  # noqa: N802
+        """OMPL's question; the answer is a real ``bool``, as OMPL 2.0 demands."""
+        x, y = self._read(state)
+        a, b, c, d, e, f = self._affine
+        u = a * x + b * y + c
+        v = d * x + e * y + f
+        if not (0 <= u < self._width and 0 <= v < self._height):
+            return False
+        return self._cells[floor(v) * self._width + floor(u)] == 1
+
+
+class GridMotionValidator(ob.MotionValidator):  # type: ignore[misc]
+    """A motion is valid when every pixel that its segment passes through is free.
+
+    One call walks the pixels exactly, corners included
+    (:func:`cbagan_ompl.segments.segment_is_free`): no step width, so no wall is too thin. It is
+    for spaces whose motions are straight in (x, y), RealVectorStateSpace and SE2StateSpace; not
+    for Dubins and Reeds-Shepp curves, where OMPL's own validator with a
+    :class:`GridValidityChecker` is the one to use.
+
+    Use: ``si.setMotionValidator(GridMotionValidator(si, grid))``.
+
+    Args:
+        si: the space information.
+        grid: the map; inflate it first for a robot with a radius.
+
+    Raises:
+        PlannerError: the states of the space have no (x, y), or motions are not straight.
+    """
+
+    def __init__(self, si: Any, grid: GridMap) -> None:
+        super().__init__(si)
+        self._read = _straight_positions(si.getStateSpace()).read
+        self._cells, self._width, self._height = grid.cells, grid.width, grid.height
+        self._affine = tuple(grid.pixel_from_world)
+
+    def checkMotion(self, s1: Any, s2: Any, *last_valid: Any) -> bool:  # noqa: N802
+        """OMPL's question. On OMPL 1.x some planners pass a third argument, which is left as is."""
+        x0, y0 = self._read(s1)
+        x1, y1 = self._read(s2)
+        a, b, c, d, e, f = self._affine
+        return segment_is_free(
+            self._cells,
+            self._width,
+            self._height,
+            a * x0 + b * y0 + c,
+            d * x0 + e * y0 + f,
+            a * x1 + b * y1 + c,
+            d * x1 + e * y1 + f,
+        )
+
+
+def _straight_positions(space: Any) -> Positions:
+    if isinstance(space, ob.DubinsStateSpace | ob.ReedsSheppStateSpace):
+        raise PlannerError(
+            f"GridMotionValidator checks straight motions, those of {type(space).__name__} are "
+            "curves: keep OMPL's own motion validator, with a GridValidityChecker and "
+            "si.setStateValidityCheckingResolution(pixel length / si.getMaximumExtent())"
+        )
+    return positions_of(space)
