@@ -1,0 +1,102 @@
+"""A learned state sampler for OMPL's planners on 2-D occupancy maps.
+
+Data flows one way: map file -> :class:`GridMap` -> :class:`Predictor` -> :class:`Heatmap` ->
+sampler -> OMPL's planner, unmodified -> path. See the README for a first example.
+
+Names that need ompl or torch are imported when they are first used: a heat map of one's own needs
+no torch, training needs no ompl.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from .errors import (
+    CbaganOmplError,
+    ConfigError,
+    DatasetError,
+    HeatmapError,
+    MapError,
+    MissingDependencyError,
+    ModelError,
+    PlannerError,
+    TaskError,
+)
+from .gridmap import GridMap
+from .heatmap import Heatmap
+from .mapfiles import bundled_maps
+from .tasks import Task, load_tasks, tasks_of
+
+if TYPE_CHECKING:
+    from .network.predictor import Predictor, load_model
+    from .planning.attach import Attachment, attach
+    from .planning.hooks import reached_planners
+    from .planning.plan import PlanResult, plan
+    from .planning.samplers import (
+        HeatmapStateSampler,
+        HeatmapValidStateSampler,
+        state_sampler_allocator,
+        valid_state_sampler_allocator,
+    )
+    from .planning.validity import GridMotionValidator, GridValidityChecker
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Attachment",
+    "CbaganOmplError",
+    "ConfigError",
+    "DatasetError",
+    "GridMap",
+    "GridMotionValidator",
+    "GridValidityChecker",
+    "Heatmap",
+    "HeatmapError",
+    "HeatmapStateSampler",
+    "HeatmapValidStateSampler",
+    "MapError",
+    "MissingDependencyError",
+    "ModelError",
+    "PlanResult",
+    "PlannerError",
+    "Predictor",
+    "Task",
+    "TaskError",
+    "attach",
+    "bundled_maps",
+    "load_model",
+    "load_tasks",
+    "plan",
+    "reached_planners",
+    "state_sampler_allocator",
+    "tasks_of",
+    "valid_state_sampler_allocator",
+]
+
+_HOMES = {
+    "network.predictor": ("Predictor", "load_model"),
+    "planning.attach": ("Attachment", "attach"),
+    "planning.hooks": ("reached_planners",),
+    "planning.plan": ("PlanResult", "plan"),
+    "planning.samplers": (
+        "HeatmapStateSampler",
+        "HeatmapValidStateSampler",
+        "state_sampler_allocator",
+        "valid_state_sampler_allocator",
+    ),
+    "planning.validity": ("GridMotionValidator", "GridValidityChecker"),
+}
+_LAZY = {name: module for module, names in _HOMES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LAZY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f".{_LAZY[name]}", __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -111,6 +111,7 @@ class GridMap:
 
         Raises:
             MapError: the file is missing, unreadable, truncated, empty or of an unknown kind.
+            ConfigError: an unknown option, or one with a value that makes no sense.
         """
         from .mapfiles import load_map
 
@@ -174,7 +175,8 @@ class GridMap:
     def is_free(self, points: ArrayLike) -> NDArray[np.bool_]:
         """Whether world points, shape (..., 2), lie in free pixels; outside the map is not free."""
         pixels = self.to_pixel(points)
-        inside = ((pixels >= 0) & (pixels < (self.width, self.height))).all(axis=-1)
+        within = (pixels >= 0) & (pixels < (self.width, self.height))
+        inside: NDArray[np.bool_] = np.asarray(within.all(axis=-1))
         indices = np.where(inside[..., None], pixels, 0).astype(np.intp)
         result: NDArray[np.bool_] = inside & self.free[indices[..., 1], indices[..., 0]]
         return result

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -27,7 +27,7 @@ class Picture(NamedTuple):
             has no alpha channel.
     """
 
-    gray: NDArray[np.uint8] | NDArray[np.uint16]
+    gray: NDArray[np.uint16]
     white: int
     opaque: NDArray[np.bool_] | None
 
@@ -63,18 +63,18 @@ def decode_picture(data: bytes, name: str) -> Picture:
     if not whole:
         raise MapError(f"{name}: the picture is truncated, get a complete copy of the file")
     try:
-        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+        # None for damaged files, whatever the annotations of OpenCV say.
+        pixels: Any = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error as error:
         raise MapError(f"{name}: the picture cannot be decoded: {error.err}") from error
-    # OpenCV returns None for damaged files, whatever its annotations say.
-    if pixels is None or pixels.dtype not in (np.uint8, np.uint16):  # type: ignore[redundant-expr]
+    if pixels is None or pixels.dtype not in (np.uint8, np.uint16):
         raise MapError(f"{name}: the picture is damaged or of a kind that OpenCV cannot decode")
-    white = int(np.iinfo(pixels.dtype).max)
+    white = 255 if pixels.dtype == np.uint8 else 65535
     if pixels.ndim == 2:
-        return Picture(pixels, white, None)
+        return Picture(pixels.astype(np.uint16), white, None)
     opaque = pixels[..., 3] == white if pixels.shape[2] == 4 else None
     colours = np.ascontiguousarray(pixels[..., :3])
-    return Picture(cv2.cvtColor(colours, cv2.COLOR_BGR2GRAY), white, opaque)
+    return Picture(cv2.cvtColor(colours, cv2.COLOR_BGR2GRAY).astype(np.uint16), white, opaque)
 
 
 # Each of the next three returns (width, height) as the header gives them, (0, 0) if it is cut off,
@@ -160,5 +160,4 @@ def _decode_pgm(data: bytes, name: str) -> Picture:
     levels = levels[: width * height]
     if levels.min() < 0 or levels.max() > white:
         raise MapError(f"{name}: the PGM holds gray levels outside 0 to {white}")
-    dtype = np.uint8 if white < 256 else np.uint16
-    return Picture(levels.astype(dtype).reshape(height, width), white, None)
+    return Picture(levels.astype(np.uint16).reshape(height, width), white, None)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, fields
 from importlib import resources
-from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +16,9 @@ from .gridmap import GridMap
 from .images import SUFFIXES, decode_picture
 from .movingai import load_movingai_map
 from .rosmap import load_ros_map
+
+if TYPE_CHECKING:
+    from importlib.resources.abc import Traversable
 
 #: What a path to a map that comes with the package begins with.
 BUNDLED = "bundled:"
@@ -102,7 +104,7 @@ def _load_bundled(name: str, settings: MapOptions) -> GridMap:
 
 def _picture_map(data: bytes, place: str, name: str, settings: MapOptions) -> GridMap:
     gray, white, opaque = decode_picture(data, place)
-    free = gray / np.float64(white) >= settings.threshold
+    free = (np.arange(white + 1) / white >= settings.threshold)[gray]
     if opaque is not None:
         free = free | ~opaque if settings.unknown_is_free else free & opaque
     if not free.any():

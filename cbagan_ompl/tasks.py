@@ -124,7 +124,8 @@ def _csv_tasks(path: Path, grid: GridMap) -> list[Task]:
             else:
                 others.add(row["map"])
     except csv.Error as error:
-        raise MapError(f"{path}, line {reader.line_num}: {error}") from error
+        # The line that cannot be split is not counted yet.
+        raise MapError(f"{path}, line {reader.line_num + 1}: {error}") from error
     if not tasks:
         raise MapError(
             f"{path}: no task for the map {grid.name!r}, only for "

@@ -107,8 +107,8 @@ def attach(
 
     def undo() -> None:
         progress.release()
+        planner.clear()  # first: a planner without samplers makes none while its options change
         undo_hook()
-        planner.clear()
 
     return Attachment(hook, stream, undo)
 

@@ -41,6 +41,12 @@ __all__ = ["BOOST_PYTHON", "HAS_STATE_SAMPLER_ALLOCATOR", "ob", "og", "ou"]
 #: Whether planners can be given a StateSampler (OMPL 1.7; not bound in 2.0.0 and 2.0.1).
 HAS_STATE_SAMPLER_ALLOCATOR = hasattr(ob.StateSpace, "setStateSamplerAllocator")
 
+# Planners that crash the interpreter by themselves, without any code of ours.
+_BROKEN = frozenset({"AORRTC", "LazyLBTRRT"})
+
+# Planners for other spaces than those of a map.
+_OTHER_SPACES = frozenset({"STRRTstar"})
+
 #: Planners that never come back from a solve whose termination condition is a Python function.
 HANGS_ON_PYTHON_TERMINATION = frozenset() if BOOST_PYTHON else frozenset({"PRM", "PRMstar"})
 
@@ -161,6 +167,33 @@ def planner_data(planner: Any) -> Any:
     return data
 
 
+def is_exact(status: Any) -> bool:
+    """Whether a planner status is an exact solution; its truth value counts approximate ones."""
+    return bool(status.getStatus() == ob.PlannerStatus.EXACT_SOLUTION)
+
+
+def path_positions(path: Any) -> NDArray[np.float64]:
+    """The states of a geometric path in the plane, (N, 2)."""
+    return np.array([(state[0], state[1]) for state in path.getStates()])
+
+
+def tree_edges(data: Any) -> NDArray[np.float64]:
+    """The edges in the plane of an ``ob.PlannerData``, (M, 2, 2)."""
+    count = data.numVertices()
+    states = [data.getVertex(i).getState() for i in range(count)]
+    points = np.array([(state[0], state[1]) for state in states]).reshape(-1, 2)
+    pairs = [(i, j) for i in range(count) for j in _edges_from(data, i)]
+    return points[np.array(pairs, dtype=np.intp).reshape(-1, 2)]
+
+
+def _edges_from(data: Any, vertex: int) -> list[int]:
+    if not BOOST_PYTHON:
+        return list(data.getEdges(vertex))
+    ends = ou.vectorUint()
+    data.getEdges(vertex, ends)
+    return list(ends)
+
+
 def planner_class(name: str) -> Any:
     """The class of a geometric planner by its OMPL name.
 
@@ -170,18 +203,24 @@ def planner_class(name: str) -> Any:
     names = planner_names()
     if name not in names:
         raise PlannerError(
-            f"OMPL {ompl_version()} has no planner {name!r}; it has {', '.join(sorted(names))}"
+            f"there is no planner {name!r} to use on OMPL {ompl_version()}; there are "
+            f"{', '.join(sorted(names))}"
         )
     return getattr(og, name)
 
 
 def planner_names() -> frozenset[str]:
-    """Names of the geometric planners of this build."""
-    return frozenset(
+    """Names of the geometric planners of this build that can be used on a map.
+
+    Left out are AORRTC (2.0.1) and LazyLBTRRT (1.7.0), which crash the interpreter by themselves,
+    and STRRTstar, which plans in space-time only.
+    """
+    names = {
         name
         for name, value in vars(og).items()
-        if isinstance(value, type) and issubclass(value, ob.Planner) and value is not ob.Planner
-    )
+        if isinstance(value, type) and issubclass(value, ob.Planner)
+    }
+    return frozenset(names - _BROKEN - _OTHER_SPACES)
 
 
 def seed_ompl(seed: int) -> None:

@@ -19,7 +19,6 @@ _DRAW_STATES = INFORMED | {
     "KPIECE1",
     "LBKPIECE1",
     "LBTRRT",
-    "LazyLBTRRT",
     "LazyPRM",
     "LazyPRMstar",
     "LazyRRT",

@@ -19,7 +19,7 @@ from ..gridmap import GridMap
 from ..heatmap import Heatmap
 from . import compat
 from .attach import attach
-from .compat import ob, og, ou
+from .compat import og, ou
 from .validity import GridMotionValidator, GridValidityChecker
 
 if TYPE_CHECKING:
@@ -27,6 +27,32 @@ if TYPE_CHECKING:
 
 #: Where the heat map of a plan can come from; "uniform" is OMPL's own sampler, untouched.
 SAMPLERS = ("learned", "uniform", "corridor", "straight-line")
+
+# Planners whose solve ends with the first solution.
+_STOP_AT_FIRST = frozenset(
+    {
+        "BFMT",
+        "BKPIECE1",
+        "BiEST",
+        "EST",
+        "FMT",
+        "KPIECE1",
+        "LBKPIECE1",
+        "LazyPRM",
+        "LazyRRT",
+        "PDST",
+        "PRM",
+        "ProjEST",
+        "RRT",
+        "RRTConnect",
+        "SBL",
+        "STRIDE",
+        "TRRT",
+    }
+)
+
+# Slack of the check that a path ends in the goal region, for the rounding of a distance.
+_ROUNDING = 1e-9
 
 #: What a result names its sampler when the caller brought the heat map.
 OWN_HEATMAP = "heatmap"
@@ -172,7 +198,7 @@ def plan(
             else None
         )
         try:
-            run = _solve(setup, time, iterations)
+            run = _solve(setup, planner, time, iterations)
             simplify_s = _simplify(setup) if simplify and run.exact else 0.0
             path = _checked_path(setup, space_map, task, tolerance) if run.exact else None
             data = compat.planner_data(setup.getPlanner())
@@ -199,7 +225,7 @@ def plan(
                 nodes=int(data.numVertices()),
                 draws=dict(link.draws) if link else {"learned": 0, "uniform": 0},
                 heatmap=drawn_from,
-                tree=_edges(data) if keep_tree else None,
+                tree=compat.tree_edges(data) if keep_tree else None,
             )
         finally:
             if link is not None:
@@ -290,28 +316,66 @@ class _Run:
     iterations: int | None
 
 
-def _solve(setup: Any, time: float, iterations: int | None) -> _Run:
-    planner = setup.getPlanner()
-    if planner.getName() in compat.HANGS_ON_PYTHON_TERMINATION:
-        return _solve_timed(setup, time, iterations)
-    watches_cost = hasattr(planner, "bestCost")
-    limit = inf if iterations is None else iterations
-    done, first = 0, None
+def _solve(setup: Any, name: str, time: float, iterations: int | None) -> _Run:
+    if name in compat.HANGS_ON_PYTHON_TERMINATION:
+        if iterations is not None:
+            raise ConfigError(
+                f"{name} of OMPL {compat.ompl_version()} cannot be limited by iterations, it "
+                "hangs on termination conditions in Python: limit its time instead"
+            )
+        condition, watch = float(time), None
+    else:
+        watch = _Watch(setup.getPlanner(), time, iterations)
+        condition = compat.termination_condition(watch.stop)
     began = perf_counter()
-    end = began + time
+    status = setup.solve(condition)
+    planning_s = perf_counter() - began
+    first = planning_s if name in _STOP_AT_FIRST else watch and watch.first_solution_s
+    exact = compat.is_exact(status)
+    return _Run(exact, str(status), planning_s, first, watch and watch.iterations)
 
-    def stop() -> bool:
-        nonlocal done, first
+
+class _Watch:
+    """The termination condition: counts iterations, and notes the first solution."""
+
+    def __init__(self, planner: Any, time: float, iterations: int | None) -> None:
+        self.iterations = 0
+        self.first_solution_s: float | None = None
+        self._limit = inf if iterations is None else iterations
+        self._waiting = hasattr(planner, "bestCost")
+        self._planner = planner
+        self._began = perf_counter()
+        self._end = self._began + time
+
+    def stop(self) -> bool:
         now = perf_counter()
-        if watches_cost and first is None and compat.best_cost(planner) < inf:
-            first = now - began
-        if done >= limit or now >= end:
+        if self._waiting and compat.best_cost(self._planner) < inf:
+            self.first_solution_s = now - self._began
+            self._waiting = False
+        if self.iterations >= self._limit or now >= self._end:
             return True
-        done += 1
+        self.iterations += 1
         return False
 
-    status = setup.solve(compat.termination_condition(stop))
-    planning_s = perf_counter() - began
-    if not watches_cost and not _ANYTIME.intersection({planner.getName()}):
-        first = planning_s
-    return _Run(_is_exact(status), str(status), planning_s, first, done)
+
+def _simplify(setup: Any) -> float:
+    began = perf_counter()
+    setup.simplifySolution()
+    return perf_counter() - began
+
+
+def _checked_path(
+    setup: Any,
+    grid: GridMap,
+    task: tuple[NDArray[np.float64], NDArray[np.float64]],
+    tolerance: float,
+) -> NDArray[np.float64] | None:
+    """The planner's path, or None when it is no path of the task after all."""
+    path = compat.path_positions(setup.getSolutionPath())
+    starts = np.array_equal(path[0], task[0])
+    ends = np.hypot(*(path[-1] - task[1])) <= tolerance + _ROUNDING
+    return path if starts and ends and grid.path_is_free(path) else None
+
+
+def _length(path: NDArray[np.float64]) -> float:
+    return float(np.hypot(*np.diff(path, axis=0).T).sum())

@@ -11,6 +11,8 @@ from ..segments import segment_is_free
 from .compat import ob
 from .positions import Positions, positions_of
 
+_LAST_VALID_PRECISION = 1e-3
+
 
 class GridValidityChecker(ob.StateValidityChecker):  # type: ignore[misc]
     """A state is valid when the pixel that its (x, y) lies in is free.
@@ -63,24 +65,45 @@ class GridMotionValidator(ob.MotionValidator):  # type: ignore[misc]
 
     def __init__(self, si: Any, grid: GridMap) -> None:
         super().__init__(si)
-        self._read = _straight_positions(si.getStateSpace()).read
+        self._space = si.getStateSpace()
+        self._read = _straight_positions(self._space).read
         self._cells, self._width, self._height = grid.cells, grid.width, grid.height
         self._affine = tuple(grid.pixel_from_world)
 
     def checkMotion(self, s1: Any, s2: Any, *last_valid: Any) -> bool:  # noqa: N802
-        """OMPL's question. On OMPL 1.x some planners pass a third argument, which is left as is."""
+        """OMPL's question; the answer is a real ``bool``.
+
+        Args:
+            s1: where the motion begins, a valid state.
+            s2: where it ends.
+            last_valid: on OMPL 1.x, some planners pass a pair of a state and a number, to be set
+                to the last valid state (to within a thousandth of the motion) and how far along
+                the motion it is.
+        """
         x0, y0 = self._read(s1)
         x1, y1 = self._read(s2)
         a, b, c, d, e, f = self._affine
-        return segment_is_free(
-            self._cells,
-            self._width,
-            self._height,
-            a * x0 + b * y0 + c,
-            d * x0 + e * y0 + f,
-            a * x1 + b * y1 + c,
-            d * x1 + e * y1 + f,
-        )
+        ends = a * x0 + b * y0 + c, d * x0 + e * y0 + f, a * x1 + b * y1 + c, d * x1 + e * y1 + f
+        free = segment_is_free(self._cells, self._width, self._height, *ends)
+        if last_valid and not free:
+            self._set_last_valid(last_valid[0], s1, s2, ends)
+        return free
+
+    def _set_last_valid(
+        self, last_valid: Any, s1: Any, s2: Any, ends: tuple[float, float, float, float]
+    ) -> None:
+        u0, v0, u1, v1 = ends
+        low, high = 0.0, 1.0
+        while high - low > _LAST_VALID_PRECISION:
+            middle = (low + high) / 2
+            u, v = u0 + middle * (u1 - u0), v0 + middle * (v1 - v0)
+            if segment_is_free(self._cells, self._width, self._height, u0, v0, u, v):
+                low = middle
+            else:
+                high = middle
+        last_valid.second = low
+        if last_valid.first is not None:
+            self._space.interpolate(s1, s2, low, last_valid.first)
 
 
 def _straight_positions(space: Any) -> Positions:

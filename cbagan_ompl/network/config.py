@@ -1,0 +1,196 @@
+"""The training recipe: one frozen record of every choice, with two named presets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from ..errors import ConfigError
+
+SCHEDULES = ("one-cycle", "exponential")
+
+
+@dataclass(frozen=True)
+class TrainingConfig:
+    """Everything that decides what a training run gives, apart from the data.
+
+    Attributes:
+        epochs: passes over the training tasks.
+        batch_size: tasks in one step.
+        generator_lr: highest learning rate of the generator.
+        map_discriminator_lr: highest learning rate of the map discriminator.
+        point_discriminator_lr: highest learning rate of the point discriminator.
+        beta1: decay of the optimisers' first moment.
+        beta2: decay of the optimisers' second moment.
+        weight_decay: decoupled decay (AdamW); with 0 the optimiser is plain Adam.
+        schedule: ``one-cycle`` (linear warm-up, then a half cosine to 0) or ``exponential``.
+        warmup: share of the steps that the warm-up of ``one-cycle`` takes.
+        decay: factor on the learning rates after each epoch of ``exponential``.
+        widths: channels of the generator after each of its four stages down.
+        channel_attention: use channel attention (in all three networks).
+        spatial_attention: use spatial attention (in all three networks).
+        discriminator_width: channels of each input of a discriminator after its first layer.
+        adversarial_every: train the discriminators, and the generator against them, in every
+            n-th step; the other steps train the generator on the supervised losses alone.
+        adversarial_weight: factor of each adversarial loss (alpha_1 = alpha_2 of the paper).
+        pixel_weight: factor of the pixel-wise squared error.
+        bce_weight: factor of the binary cross-entropy.
+        dice_weight: factor of the Dice loss.
+        dice_smooth: smoothing term of the Dice loss.
+        symmetries: turn and mirror each task at random (8 symmetries of the square).
+        reversal: exchange start and goal at random.
+        ema_decay: validate and export a moving average of the generator with this decay a step;
+            0 turns it off.
+        validation_fraction: share of the training tasks that is held back for validation.
+        seed: seeds the weights, the split, the order, the augmentation and the noise.
+    """
+
+    epochs: int = 28
+    batch_size: int = 32
+    generator_lr: float = 2e-3
+    map_discriminator_lr: float = 5e-4
+    point_discriminator_lr: float = 5e-4
+    beta1: float = 0.9
+    beta2: float = 0.999
+    weight_decay: float = 0.01
+    schedule: str = "one-cycle"
+    warmup: float = 0.1
+    decay: float = 0.95
+    widths: tuple[int, ...] = (32, 64, 96, 128)
+    channel_attention: bool = True
+    spatial_attention: bool = True
+    discriminator_width: int = 32
+    adversarial_every: int = 5
+    adversarial_weight: float = 0.1
+    pixel_weight: float = 20.0
+    bce_weight: float = 1.0
+    dice_weight: float = 10.0
+    dice_smooth: float = 1.0
+    symmetries: bool = True
+    reversal: bool = True
+    ema_decay: float = 0.998
+    validation_fraction: float = 0.05
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Check the values.
+
+        Raises:
+            ConfigError: a value that makes no sense; the message names the option.
+        """
+        if len(self.widths) != 4 or min(self.widths) < 1:
+            raise ConfigError(f"widths are four positive channel counts, got {self.widths}")
+        if self.schedule not in SCHEDULES:
+            raise ConfigError(
+                f"schedule is one of {', '.join(SCHEDULES)}, got {self.schedule!r}"
+            )
+        for name in ("epochs", "batch_size", "discriminator_width", "adversarial_every"):
+            self._check(name, getattr(self, name) >= 1, "at least 1")
+        for name in ("generator_lr", "map_discriminator_lr", "point_discriminator_lr", "decay"):
+            self._check(name, getattr(self, name) > 0, "positive")
+        for name in ("beta1", "beta2", "warmup", "ema_decay"):
+            self._check(name, 0 <= getattr(self, name) < 1, "at least 0 and below 1")
+        self._check("validation_fraction", 0 < self.validation_fraction < 1, "between 0 and 1")
+        for field in fields(self):
+            if field.name.endswith(("_weight", "_decay", "_smooth", "seed")):
+                self._check(field.name, getattr(self, field.name) >= 0, "at least 0")
+
+    def _check(self, name: str, holds: bool, rule: str) -> None:
+        if not holds:
+            raise ConfigError(f"{name} must be {rule}, got {getattr(self, name)}")
+
+    @classmethod
+    def preset(cls, name: str) -> TrainingConfig:
+        """One of :data:`PRESETS`.
+
+        Raises:
+            ConfigError: there is no preset of that name.
+        """
+        if name not in PRESETS:
+            raise ConfigError(f"unknown preset {name!r}; choose one of {', '.join(PRESETS)}")
+        return PRESETS[name]
+
+    @classmethod
+    def from_file(
+        cls, path: str | PathLike[str], base: TrainingConfig | None = None
+    ) -> TrainingConfig:
+        """Read options from a JSON or YAML file; those it leaves out keep the values of ``base``.
+
+        Raises:
+            ConfigError: the file is missing, cannot be parsed, holds an unknown option, or a value
+                of the wrong type or out of range.
+        """
+        try:
+            values = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+        except OSError as error:
+            raise ConfigError(f"{path}: cannot read the file ({error.strerror})") from error
+        except (yaml.YAMLError, UnicodeDecodeError) as error:
+            raise ConfigError(f"{path}: neither JSON nor YAML ({error})") from error
+        if not isinstance(values, dict):
+            raise ConfigError(f"{path}: a configuration holds lines such as 'epochs: 20'")
+        return (base or cls()).updated(values)
+
+    def updated(self, values: Mapping[str, Any]) -> TrainingConfig:
+        """A copy with some options changed.
+
+        Raises:
+            ConfigError: an unknown option, or a value of the wrong type or out of range.
+        """
+        known = asdict(self)
+        for name in values:
+            if name not in known:
+                raise ConfigError(f"unknown option {name!r}; known are {', '.join(known)}")
+        return replace(
+            self, **{name: _as_type_of(known[name], name, value) for name, value in values.items()}
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The options as JSON has them."""
+        return {
+            name: list(value) if isinstance(value, tuple) else value
+            for name, value in asdict(self).items()
+        }
+
+
+def _as_type_of(default: Any, name: str, value: Any) -> Any:
+    """The value in the type of the default; YAML reads 1e-4 as text, and 1 where 1.0 was meant."""
+    if isinstance(default, tuple):
+        if isinstance(value, list | tuple) and all(type(item) is int for item in value):
+            return tuple(value)
+    elif isinstance(default, float):
+        try:
+            if not isinstance(value, bool):
+                return float(value)
+        except (TypeError, ValueError):
+            pass
+    elif type(value) is type(default):
+        return value
+    kind = "list of integers" if isinstance(default, tuple) else type(default).__name__
+    raise ConfigError(f"{name} must be a value of type {kind}, got {value!r}")
+
+
+#: ``default`` is what the bundled model was trained with; ``paper`` is the recipe of the paper
+#: where it is explicit (its table of hyper-parameters: Adam, 20 epochs, batches of 8).
+PRESETS: dict[str, TrainingConfig] = {
+    "default": TrainingConfig(),
+    "paper": TrainingConfig(
+        epochs=20,
+        batch_size=8,
+        generator_lr=1e-4,
+        map_discriminator_lr=5e-5,
+        point_discriminator_lr=5e-5,
+        beta1=0.5,
+        beta2=0.999,
+        weight_decay=0.0,
+        schedule="exponential",
+        adversarial_every=1,
+        adversarial_weight=0.5,
+        reversal=False,
+        ema_decay=0.0,
+    ),
+}

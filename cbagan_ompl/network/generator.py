@@ -1,0 +1,156 @@
+"""The generator: map, points and noise in, the image of the promising region out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from .attention import AttentionBlock
+
+#: The generator halves its input this many times; height and width are multiples of 2 to it.
+STAGES = 4
+STRIDE = 2**STAGES
+
+#: Channels of the map stem and of the point stem; the noise stem has twice as many.
+STEM = 16
+
+
+class ResidualBlock(nn.Module):
+    """Two 3x3 convolutions with batch norm and attention, added to a shortcut.
+
+    Args:
+        in_channels: channels of the input.
+        out_channels: channels of the output.
+        stride: 2 halves height and width in the first convolution, 1 keeps them.
+        channel_attention: see :class:`AttentionBlock`.
+        spatial_attention: see :class:`AttentionBlock`.
+    """
+
+    def __init__(
+        self,
+        in_channels: int,
+        out_channels: int,
+        stride: int,
+        channel_attention: bool,
+        spatial_attention: bool,
+    ) -> None:
+        super().__init__()
+        self.body = nn.Sequential(
+            nn.Conv2d(in_channels, out_channels, 3, stride, padding=1, bias=False),
+            nn.BatchNorm2d(out_channels),
+            nn.ReLU(inplace=True),
+            nn.Conv2d(out_channels, out_channels, 3, padding=1, bias=False),
+            nn.BatchNorm2d(out_channels),
+            AttentionBlock(out_channels, channel_attention, spatial_attention),
+        )
+        self.shortcut: nn.Module = nn.Identity()
+        if stride != 1 or in_channels != out_channels:
+            # Averaging before the 1x1 convolution uses all pixels, where a stride drops three of
+            # four, and its backward pass is several times as fast on a CPU.
+            self.shortcut = nn.Sequential(
+                nn.AvgPool2d(stride),
+                nn.Conv2d(in_channels, out_channels, 1, bias=False),
+                nn.BatchNorm2d(out_channels),
+            )
+
+    def forward(self, features: Tensor) -> Tensor:
+        """(B, C_in, H, W) -> (B, C_out, H / stride, W / stride)."""
+        return torch.relu(self.body(features) + self.shortcut(features))
+
+
+class UpBlock(nn.Module):
+    """Twice the height and width, the skip from the way down added, then a residual block.
+
+    The channels change by a 1x1 convolution before the upsampling, where it costs a quarter.
+
+    Args:
+        in_channels: channels of the coarse features.
+        out_channels: channels of the output, and of the skip.
+        channel_attention: see :class:`AttentionBlock`.
+        spatial_attention: see :class:`AttentionBlock`.
+    """
+
+    def __init__(
+        self,
+        in_channels: int,
+        out_channels: int,
+        channel_attention: bool,
+        spatial_attention: bool,
+    ) -> None:
+        super().__init__()
+        self.project = nn.Conv2d(in_channels, out_channels, 1)
+        self.block = ResidualBlock(
+            out_channels, out_channels, 1, channel_attention, spatial_attention
+        )
+
+    def forward(self, features: Tensor, skip: Tensor) -> Tensor:
+        """(B, C_in, H, W) and (B, C_out, 2 H, 2 W) -> (B, C_out, 2 H, 2 W)."""
+        upsampled = functional.interpolate(self.project(features), scale_factor=2.0, mode="nearest")
+        return self.block(upsampled + skip)
+
+
+class Generator(nn.Module):
+    """The generator of the paper: stems, four residual stages down, four up, 1x1 to an image.
+
+    The paper gives the stems (3x3, to 16, 16 and 32 channels, ReLU), the number of stages and the
+    last layer (1x1 to three channels, tanh). Chosen here, because the text is silent:
+
+    * the widths: most weights sit in the coarse stages, which see the whole map and cost little
+      time; the last stage runs at full size with the 16 channels of a stem;
+    * additive skips between stages of equal size, so that walls stay sharp;
+    * batch norm in every residual block, and at the end of it the attention block that the paper
+      draws for the discriminators; only the last stage has none, where it would cost most.
+
+    Args:
+        widths: channels after each of the four stages on the way down; the way up mirrors them.
+        channel_attention: see :class:`AttentionBlock`.
+        spatial_attention: see :class:`AttentionBlock`.
+    """
+
+    def __init__(
+        self,
+        widths: Sequence[int] = (32, 64, 96, 128),
+        channel_attention: bool = True,
+        spatial_attention: bool = True,
+    ) -> None:
+        super().__init__()
+        self.map_stem = nn.Conv2d(3, STEM, 3, padding=1)
+        self.point_stem = nn.Conv2d(3, STEM, 3, padding=1)
+        self.noise_stem = nn.Conv2d(1, 2 * STEM, 3, padding=1)
+        attention = (channel_attention, spatial_attention)
+        one, two, three, four = widths
+        self.down1 = ResidualBlock(4 * STEM, one, 2, *attention)
+        self.down2 = ResidualBlock(one, two, 2, *attention)
+        self.down3 = ResidualBlock(two, three, 2, *attention)
+        self.down4 = ResidualBlock(three, four, 2, *attention)
+        self.up4 = UpBlock(four, three, *attention)
+        self.up3 = UpBlock(three, two, *attention)
+        self.up2 = UpBlock(two, one, *attention)
+        self.up1 = UpBlock(one, STEM, False, False)
+        self.head = nn.Conv2d(STEM, 3, 1)
+
+    def forward(self, map_image: Tensor, point_image: Tensor, noise: Tensor) -> Tensor:
+        """The image of the region, values in (-1, 1).
+
+        Args:
+            map_image: (B, 3, H, W) in [-1, 1], see :mod:`cbagan_ompl.network.encoding`.
+            point_image: (B, 3, H, W) in [-1, 1].
+            noise: (B, 1, H, W), standard normal in training, zero at inference.
+
+        Returns:
+            (B, 3, H, W); H and W must be multiples of ``STRIDE``.
+        """
+        of_map = torch.relu(self.map_stem(map_image))
+        of_points = torch.relu(self.point_stem(point_image))
+        of_noise = torch.relu(self.noise_stem(noise))
+        half = self.down1(torch.cat((of_map, of_points, of_noise), 1))
+        quarter = self.down2(half)
+        eighth = self.down3(quarter)
+        features = self.up4(self.down4(eighth), eighth)
+        features = self.up3(features, quarter)
+        features = self.up2(features, half)
+        features = self.up1(features, of_map + of_points)
+        return torch.tanh(self.head(features))

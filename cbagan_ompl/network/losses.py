@@ -1,0 +1,113 @@
+"""The losses of the paper.
+
+The paper writes the segmentation loss for a map "in the x direction" and one "in the y direction"
+(P^x, P^y) without defining them. They are read here as the same map, summed along rows and along
+columns: then L_bce^xy is twice the binary cross-entropy and L_dice^xy is the Dice loss. Sums over
+pixels are taken as means, so that no weight depends on the size of the images.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+
+def bce_loss(predicted: Tensor, target: Tensor) -> Tensor:
+    """L_bce^xy (eq. total_ce_loss), the mean over all pixels.
+
+    Args:
+        predicted: probability of the region, (B, 1, H, W) in [0, 1].
+        target: the true region, the same shape, 0 or 1.
+    """
+    return 2 * functional.binary_cross_entropy(predicted, target)
+
+
+def dice_loss(predicted: Tensor, target: Tensor, smooth: float = 1.0) -> Tensor:
+    """L_dice^xy (eq. dice_loss), the mean over the images of a batch.
+
+    Args:
+        predicted: probability of the region, (B, 1, H, W) in [0, 1].
+        target: the true region, the same shape, 0 or 1.
+        smooth: added above and below the fraction, so that an empty region has a loss.
+    """
+    overlap = (predicted * target).sum(dim=(1, 2, 3))
+    size = (predicted.square() + target.square()).sum(dim=(1, 2, 3))
+    return (1 - (2 * overlap + smooth) / (size + smooth)).mean()
+
+
+def segmentation_loss(
+    predicted: Tensor,
+    target: Tensor,
+    bce_weight: float = 1.0,
+    dice_weight: float = 10.0,
+    smooth: float = 1.0,
+) -> Tensor:
+    """L (eq. total_loss), with the paper's factor 10 on the Dice loss.
+
+    The paper adds L to the loss of each discriminator as well. It does not depend on their
+    weights, so it has no effect there; it is part of the generator's loss instead.
+
+    Args:
+        predicted: probability of the region, (B, 1, H, W) in [0, 1].
+        target: the true region, the same shape, 0 or 1.
+        bce_weight: factor of L_bce^xy.
+        dice_weight: factor of L_dice^xy.
+        smooth: see :func:`dice_loss`.
+    """
+    return bce_weight * bce_loss(predicted, target) + dice_weight * dice_loss(
+        predicted, target, smooth
+    )
+
+
+def discriminator_loss(real_logits: Tensor, fake_logits: Tensor) -> Tensor:
+    """-log D(real) - log(1 - D(fake)) (eq. loss_map_discriminator, eq. loss_point_discriminator).
+
+    The paper prints the sum of logarithms that a discriminator maximises; this is what it
+    minimises.
+
+    Args:
+        real_logits: the discriminator's logits for true regions, any shape.
+        fake_logits: its logits for generated regions.
+    """
+    return functional.binary_cross_entropy_with_logits(
+        real_logits, torch.ones_like(real_logits)
+    ) + functional.binary_cross_entropy_with_logits(fake_logits, torch.zeros_like(fake_logits))
+
+
+def adversarial_loss(fake_logits: Tensor) -> Tensor:
+    """-log D(fake): what one discriminator adds to the generator's loss.
+
+    Args:
+        fake_logits: the discriminator's logits for generated regions, any shape.
+    """
+    return functional.binary_cross_entropy_with_logits(fake_logits, torch.ones_like(fake_logits))
+
+
+def pixel_loss(image: Tensor, target: Tensor) -> Tensor:
+    """L_mse (eq. mse_loss), the mean over pixels and channels.
+
+    Args:
+        image: the generated region image, (B, 3, H, W) in [-1, 1].
+        target: the region image of the true region.
+    """
+    return functional.mse_loss(image, target)
+
+
+def generator_loss(
+    adversarial: Tensor,
+    pixel: Tensor,
+    segmentation: Tensor,
+    adversarial_weight: float = 0.5,
+    pixel_weight: float = 20.0,
+) -> Tensor:
+    """L_G (eq. total_generator_loss) plus L.
+
+    Args:
+        adversarial: sum of :func:`adversarial_loss` over the two discriminators.
+        pixel: :func:`pixel_loss`.
+        segmentation: :func:`segmentation_loss`, already weighted.
+        adversarial_weight: alpha_1 = alpha_2.
+        pixel_weight: factor of the pixel-wise loss, 20 in the paper's table.
+    """
+    return adversarial_weight * adversarial + pixel_weight * pixel + segmentation

@@ -1,0 +1,22 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cbagan_ompl import GridMap, Heatmap
+
+START, GOAL = (10.0, 10.0), (240.0, 240.0)
+
+
+@pytest.fixture(scope="session")
+def two_walls() -> GridMap:
+    """256 x 256, two walls with one gap each, on opposite sides."""
+    free = np.ones((256, 256), bool)
+    free[60:70, :200] = False
+    free[150:160, 50:] = False
+    return GridMap(free, name="two_walls")
+
+
+@pytest.fixture(scope="session")
+def corridor(two_walls: GridMap) -> Heatmap:
+    return Heatmap.corridor(two_walls, START, GOAL)

@@ -1,0 +1,152 @@
+"""The samplers on their own, as OMPL calls them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import GOAL, START
+
+from cbagan_ompl import (
+    ConfigError,
+    GridMap,
+    GridValidityChecker,
+    Heatmap,
+    HeatmapStateSampler,
+    HeatmapValidStateSampler,
+    state_sampler_allocator,
+    valid_state_sampler_allocator,
+)
+from cbagan_ompl.planning import compat
+from cbagan_ompl.planning.compat import ob, og
+
+
+class Fake:
+    """Stands for a state, so that samplers can be asked without a planner."""
+
+    def __init__(self, x: float = 0.0, y: float = 0.0) -> None:
+        self.values = [x, y]
+
+    def __getitem__(self, axis: int) -> float:
+        return self.values[axis]
+
+    def __setitem__(self, axis: int, value: float) -> None:
+        assert type(value) is float, "OMPL takes no NumPy scalars"
+        self.values[axis] = value
+
+
+class FakeSpace:
+    """Lets a sampler enforce bounds on fake states."""
+
+    def enforceBounds(self, state: Fake) -> None:  # noqa: N802
+        state.values = [min(max(value, 0.0), 256.0) for value in state.values]
+
+
+@pytest.fixture
+def sampler(two_walls: GridMap, corridor: Heatmap) -> Any:
+    space = compat.plane_space(*two_walls.bounds)
+    made = HeatmapStateSampler(space, corridor, uniform_fraction=0.1, seed=4)
+    made._space = FakeSpace()
+    return made
+
+
+def test_all_three_methods(corridor: Heatmap, sampler: Any) -> None:
+    state = Fake()
+    seen = np.empty((500, 2))
+    for i in range(len(seen)):
+        sampler.sampleUniform(state)
+        seen[i] = state.values
+    heat = corridor.values[tuple(seen.astype(int).T[::-1])]
+    assert heat.mean() > 0.4
+    for _ in range(100):
+        sampler.sampleUniformNear(state, Fake(20, 20), 15.0)
+        assert max(abs(state[0] - 20), abs(state[1] - 20)) <= 15
+        sampler.sampleGaussian(state, Fake(20, 20), 3.0)
+        assert max(abs(state[0] - 20), abs(state[1] - 20)) <= 20
+    sampler.sampleUniformNear(state, Fake(0, 0), 1e-6)
+    assert min(state.values) >= 0, "draws stay in the bounds of the space"
+    assert sum(sampler.draws.values()) == 701
+
+
+def test_same_seed_same_draws(two_walls: GridMap, corridor: Heatmap) -> None:
+    space = compat.plane_space(*two_walls.bounds)
+    drawn = []
+    for _ in range(2):
+        sampler, state = HeatmapStateSampler(space, corridor, seed=9), Fake()
+        sampler.sampleUniform(state)
+        drawn.append(state.values)
+    assert drawn[0] == drawn[1]
+
+
+def test_bad_fraction(two_walls: GridMap, corridor: Heatmap) -> None:
+    with pytest.raises(ConfigError, match="uniform_fraction"):
+        HeatmapStateSampler(compat.plane_space(*two_walls.bounds), corridor, uniform_fraction=0)
+
+
+def make_setup(grid: GridMap) -> Any:
+    setup = og.SimpleSetup(compat.plane_space(*grid.bounds))
+    si = setup.getSpaceInformation()
+    setup.setStateValidityChecker(GridValidityChecker(si, grid))
+    ends = compat.new_state(setup.getStateSpace()), compat.new_state(setup.getStateSpace())
+    for end, point in zip(ends, (START, GOAL), strict=True):
+        end[0], end[1] = point
+    setup.setStartAndGoalStates(*ends, 2.0)
+    return setup
+
+
+def test_valid_state_sampler_by_hand(two_walls: GridMap, corridor: Heatmap) -> None:
+    """The drop-in without attach: the documented OMPL calls, our allocator."""
+    made: list[HeatmapValidStateSampler] = []
+
+    def allocate(si: Any) -> HeatmapValidStateSampler:
+        made.append(HeatmapValidStateSampler(si, corridor, seed=1))
+        return made[-1]
+
+    setup = make_setup(two_walls)
+    si = setup.getSpaceInformation()
+    si.setValidStateSamplerAllocator(compat.valid_state_sampler_allocator(allocate))
+    setup.setPlanner(og.PRM(si))
+    assert compat.is_exact(setup.solve(2.0))
+    assert made[0].draws["learned"] > 10
+    compat.clear_valid_state_sampler(si)
+
+
+def test_allocators(two_walls: GridMap, corridor: Heatmap) -> None:
+    setup = make_setup(two_walls)
+    si = setup.getSpaceInformation()
+    si.setValidStateSamplerAllocator(valid_state_sampler_allocator(corridor, seed=1))
+    sampler = si.allocValidStateSampler()
+    state = compat.new_state(setup.getStateSpace())
+    typed = compat.typed_state(state)
+    for _ in range(50):
+        assert sampler.sample(typed)
+        assert two_walls.is_free((typed[0], typed[1]))
+    compat.clear_valid_state_sampler(si)
+    if compat.HAS_STATE_SAMPLER_ALLOCATOR:
+        setup.getStateSpace().setStateSamplerAllocator(state_sampler_allocator(corridor, seed=1))
+        sampler = setup.getStateSpace().allocStateSampler()
+        sampler.sampleUniform(typed)
+        assert two_walls.is_free((typed[0], typed[1]))
+        setup.getStateSpace().clearStateSamplerAllocator()
+    else:
+        assert callable(state_sampler_allocator(corridor))
+
+
+def test_valid_state_sampler_obeys_the_validity_checker(
+    two_walls: GridMap, corridor: Heatmap
+) -> None:
+    """A user's checker may be stricter than the map."""
+    setup = make_setup(two_walls)
+    setup.setStateValidityChecker(compat.validity_function(lambda state: state[0] < 100))
+    si = setup.getSpaceInformation()
+    sampler = HeatmapValidStateSampler(si, corridor, seed=1)
+    state = compat.new_state(setup.getStateSpace())
+    typed = compat.typed_state(state)
+    for _ in range(100):
+        assert sampler.sample(typed)
+        assert typed[0] < 100
+    setup.setStateValidityChecker(compat.validity_function(lambda state: False))
+    sampler.setNrAttempts(5)
+    assert not sampler.sample(typed)
+    assert issubclass(HeatmapValidStateSampler, ob.ValidStateSampler)
