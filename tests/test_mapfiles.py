@@ -364,6 +364,14 @@ def test_ros_raw_levels_are_percent(ros):
     assert load_map(deep).free.tolist() == [[True, True, *[False] * 6]]
 
 
+def test_ros_raw_looks_at_no_transparency(ros):
+    bgra = np.zeros((1, 2, 4), np.uint8)
+    bgra[0, 1, :3] = 90
+    path = ros(bgra, image="picture.png", mode="raw")
+    assert load_map(path).free.tolist() == [[True, False]]
+    assert load_map(path, unknown_is_free=True).free.tolist() == [[True, False]]
+
+
 def test_ros_picture_of_other_formats_in_other_folders(ros, tmp_path):
     (tmp_path / "pictures").mkdir()
     colour = cv2.cvtColor(GRAYS, cv2.COLOR_GRAY2BGR)

@@ -50,7 +50,7 @@ class TrainingConfig:
         seed: seeds the weights, the split, the order, the augmentation and the noise.
     """
 
-    epochs: int = 28
+    epochs: int = 26
     batch_size: int = 32
     generator_lr: float = 2e-3
     map_discriminator_lr: float = 5e-4
@@ -65,7 +65,7 @@ class TrainingConfig:
     channel_attention: bool = True
     spatial_attention: bool = True
     discriminator_width: int = 32
-    adversarial_every: int = 5
+    adversarial_every: int = 6
     adversarial_weight: float = 0.1
     pixel_weight: float = 20.0
     bce_weight: float = 1.0
