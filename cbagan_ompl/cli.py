@@ -150,8 +150,14 @@ def _point(text: str) -> tuple[float, float]:
 
 
 def _plan(args: argparse.Namespace) -> int:
+    from .picture import check_picture_path, save_picture
     from .planning.plan import plan
 
+    if args.output is not None:
+        check_picture_path(args.output)
+    for path in (args.output, args.json):
+        if path is not None and not Path(path).parent.is_dir():
+            raise ConfigError(f"cannot write {path}: its folder does not exist")
     options: dict[str, Any] = {"unknown_is_free": args.unknown_is_free}
     if args.threshold is not None:
         options["threshold"] = args.threshold
@@ -179,8 +185,6 @@ def _plan(args: argparse.Namespace) -> int:
     if args.json is not None:
         _write_json(args.json, values)
     if args.output is not None:
-        from .picture import save_picture
-
         save_picture(result, grid, args.output)
         print(f"picture        {args.output}")
     return 0 if result.solved else 1

@@ -15,7 +15,8 @@ from .heatmap import Heatmap, draw_points
 #: Share of draws that stays uniform over free space unless the user asks otherwise.
 DEFAULT_UNIFORM_FRACTION = 0.1
 
-_BATCH = 1024
+# The first batch is small, because small tasks need few draws; each is twice the one before.
+_FIRST_BATCH, _LARGEST_BATCH = 64, 1024
 # Candidates of which a local draw picks one, with probability proportional to the heat map.
 _LOCAL_CANDIDATES = 32
 # Batches without a single point inside the informed set before a draw from outside is let through.
@@ -74,6 +75,7 @@ class DrawStream:
         self.uniform = 0
         self._rng = np.random.default_rng(seed)
         self._parts = (_Part(heatmap), _Part(Heatmap.uniform(heatmap.grid)))
+        self._batch = _FIRST_BATCH
         self._pending: list[tuple[float, float, float, bool]] = []
         self._best_cost: Callable[[], float] = _no_cost
         self._informed_set: Callable[[], InformedSet] = _no_set
@@ -154,23 +156,17 @@ class DrawStream:
         return x, y
 
     def _refill(self, best: float) -> None:
-        uniform = self._rng.random(_BATCH) < self.uniform_fraction
-        points = np.empty((_BATCH, 2))
+        size, self._batch = self._batch, min(2 * self._batch, _LARGEST_BATCH)
+        uniform = self._rng.random(size) < self.uniform_fraction
+        points = np.empty((size, 2))
         for part, mask in zip(self._parts, (~uniform, uniform), strict=True):
             points[mask] = part.draw(int(mask.sum()), best, self._rng)
         if self._informed is None:
-            bounds = np.full(_BATCH, -inf)
+            bounds = np.full(size, -inf)
         else:
             bounds = self._informed.shortest_through(points)
-        self._pending = list(
-            zip(
-                points[:, 0].tolist(),
-                points[:, 1].tolist(),
-                bounds.tolist(),
-                uniform.tolist(),
-                strict=True,
-            )
-        )
+        columns = points[:, 0], points[:, 1], bounds, uniform
+        self._pending = list(zip(*(column.tolist() for column in columns), strict=True))
 
 
 class _Part:

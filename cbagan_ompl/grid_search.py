@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
@@ -34,7 +36,7 @@ def shortest_path(
     Returns:
         Pixels (column, row), shape (K, 2), both ends included; None where nothing joins them.
     """
-    height, width = free.shape
+    width = free.shape[1]
     source, target = start[1] * width + start[0], goal[1] * width + goal[0]
     graph = _grid_graph(free, np.ones(free.shape, np.float32) if cost is None else cost)
     _, predecessors = dijkstra(graph, directed=False, indices=source, return_predecessors=True)
@@ -81,7 +83,7 @@ def pull_taut(free: NDArray[np.bool_], pixels: NDArray[np.intp]) -> NDArray[np.f
     cells = free.tobytes()
     points = (pixels + 0.5).tolist()
     corners = [points[0]]
-    for here, ahead in zip(points[1:], points[2:], strict=False):
+    for here, ahead in pairwise(points[1:]):
         if not segment_is_free(cells, width, height, *corners[-1], *ahead):
             corners.append(here)
     corners.append(points[-1])

@@ -1,9 +1,10 @@
-"""The heat map: where on a map a good path probably runs, as a distribution over its free pixels."""
+"""The heat map: where on a map a good path probably runs, as a distribution over free pixels."""
 
 from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -137,7 +138,7 @@ class Heatmap:
             goal: (x, y), world.
         """
         parts = cv2.connectedComponents(self.region.astype(np.uint8), connectivity=4)[1]
-        first, second = _pixel_pair(self.grid.to_pixel((start, goal)))
+        first, second = _pixel_pair(self.grid.to_pixel(np.array((start, goal))))
         label = int(parts[first[1], first[0]])
         return label > 0 and label == int(parts[second[1], second[0]])
 
@@ -163,7 +164,9 @@ class Heatmap:
         price = np.where(self.region, np.float32(_REGION_PRICE), 1 + _REGION_PRICE - self.values)
         pixels = shortest_path(self.grid.free, *_pixel_pair(ends), price)
         assert pixels is not None, "check_task has made sure that a path exists"
-        bridge = _band(self.grid.shape, pixels + 0.5, _half_width(self.grid, _BRIDGE_SHARE))
+        bridge = _band(
+            self.grid.shape, pixels + np.float64(0.5), _half_width(self.grid, _BRIDGE_SHARE)
+        )
         return Heatmap(np.maximum(self.values, bridge), self.grid)
 
     def sample(self, n: int, rng: np.random.Generator | int | None = None) -> NDArray[np.float64]:
@@ -217,11 +220,11 @@ def draw_points(
     return grid.to_world(corners + rng.random((n, 2)))
 
 
-def _to_unit_range(raw: NDArray[np.generic]) -> NDArray[np.float32]:
-    if raw.dtype.kind == "b":
-        return raw.astype(np.float32)
-    if raw.dtype.kind == "u":
-        return (raw / np.iinfo(raw.dtype).max).astype(np.float32)
+def _to_unit_range(raw: NDArray[Any]) -> NDArray[np.float32]:
+    """A fresh array of the values in [0, 1]."""
+    if raw.dtype.kind in "bu":
+        full = 1 if raw.dtype.kind == "b" else np.iinfo(raw.dtype).max
+        return raw.astype(np.float32) / np.float32(full)
     if raw.dtype.kind not in "if":
         raise HeatmapError(f"a heat map holds real numbers, not {raw.dtype}")
     values = raw.astype(np.float32)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
@@ -44,18 +45,26 @@ def save_picture(result: PlanResult, grid: GridMap, path: str | PathLike[str]) -
         ConfigError: a suffix that stands for no known format, or a folder that cannot be
             written to.
     """
+    check_picture_path(path)
     figure = draw_plan(result, grid)
-    formats = figure.canvas.get_supported_filetypes()
-    suffix = Path(path).suffix.lstrip(".").lower()
-    if suffix not in formats:
-        raise ConfigError(
-            f"cannot save a picture as {Path(path).name!r}; its suffix must be one of "
-            f"{', '.join('.' + name for name in sorted(formats))}"
-        )
     try:
         figure.savefig(path, dpi=_DOTS_PER_INCH)
     except OSError as error:
         raise ConfigError(f"cannot write the picture {path}: {error.strerror or error}") from error
+
+
+def check_picture_path(path: str | PathLike[str]) -> None:
+    """Refuse a picture file of an unknown format before any work is done for it.
+
+    Raises:
+        ConfigError: the suffix stands for no format that can be written.
+    """
+    formats = FigureCanvasAgg.get_supported_filetypes()
+    if Path(path).suffix.lstrip(".").lower() not in formats:
+        raise ConfigError(
+            f"cannot save a picture as {Path(path).name!r}; its suffix must be one of "
+            f"{', '.join('.' + name for name in sorted(formats))}"
+        )
 
 
 def draw_plan(result: PlanResult, grid: GridMap) -> Figure:

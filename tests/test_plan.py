@@ -47,6 +47,11 @@ def test_samplers_and_planners(two_walls: GridMap, planner: str, sampler: str) -
     assert (result.inference_s > 0) == (sampler != "uniform")
     assert result.first_solution_s is not None
     assert 0 < result.first_solution_s <= result.planning_s
+    assert (len(result.progress) > 0) == ("RRTstar" in planner)
+    if len(result.progress):
+        assert result.progress[0, 0] == result.first_solution_s
+        assert (np.diff(result.progress[:, 1]) < 0).all()
+        assert np.isclose(result.progress[-1, 1], result.cost)
 
 
 @pytest.mark.parametrize("name", bundled_maps())
@@ -59,8 +64,8 @@ def test_bundled_tasks_can_be_solved(name: str) -> None:
 
 def test_corridor_beats_uniform_where_it_is_hard() -> None:
     """The oracle needs fewer iterations to a first solution: the hook does its work."""
-    grid = GridMap.load("bundled:rooms")
-    task = tasks_of("bundled:rooms", grid)[0]
+    grid = GridMap.load("bundled:maze")
+    task = tasks_of("bundled:maze", grid)[0]
     medians = {
         sampler: np.median(
             [
@@ -116,6 +121,16 @@ def test_simplify_shortens(two_walls: GridMap) -> None:
     check(shorter, two_walls)
     assert shorter.cost < 0.97 * plain.cost
     assert shorter.simplify_s > 0
+
+
+@pytest.mark.parametrize("sampler", ["uniform", "corridor"])
+@pytest.mark.parametrize("planner", ["RRT", "RRTstar", "InformedRRTstar"])
+def test_path_to_the_goal_itself(two_walls: GridMap, planner: str, sampler: str) -> None:
+    result = plan(
+        two_walls, START, GOAL, planner, sampler, 5, 1500, range=20, seed=0, goal_tolerance=0
+    )
+    check(result, two_walls)
+    np.testing.assert_array_equal(result.path[-1], GOAL)
 
 
 def test_own_heatmap(two_walls: GridMap, corridor: Heatmap) -> None:
@@ -190,7 +205,7 @@ def test_bad_input(
 def test_separate_parts_are_told_at_once() -> None:
     free = np.ones((50, 50), bool)
     free[:, 25] = False
-    with pytest.raises(TaskError, match="no path joins start .10, 10. and goal .40, 10."):
+    with pytest.raises(TaskError, match=r"no path joins start \(10, 10\) and goal \(40, 10\)"):
         plan(GridMap(free), (10, 10), (40, 10), sampler="uniform", time=60)
 
 
@@ -202,7 +217,7 @@ def test_heatmap_of_another_map(two_walls: GridMap) -> None:
 
 def test_prm_and_iterations(two_walls: GridMap) -> None:
     if "PRM" in compat.HANGS_ON_PYTHON_TERMINATION:
-        with pytest.raises(ConfigError, match="PRM.*cannot be limited by iterations"):
+        with pytest.raises(ConfigError, match=r"PRM .*cannot be limited by iterations"):
             plan(two_walls, START, GOAL, "PRM", "uniform", iterations=10)
 
 

@@ -51,6 +51,8 @@ _STOP_AT_FIRST = frozenset(
     }
 )
 
+_LEAST_THRESHOLD = float(np.finfo(np.float64).eps)
+
 # Slack of the check that a path ends in the goal region, for the rounding of a distance.
 _ROUNDING = 1e-9
 
@@ -77,12 +79,14 @@ class PlanResult:
         goal_tolerance: how far from the goal a path may end.
         path: (N, 2); empty when not solved.
         cost: length of the path; infinite when not solved.
-        inference_s: making the heat map, loading the model not included.
+        inference_s: making the heat map and attaching it, loading the model not included.
         planning_s: inside the planner's ``solve``.
         simplify_s: inside OMPL's path simplifier.
         total_s: the sum of the three.
         first_solution_s: planning time to the first solution; None when not solved or the
             planner does not let it be known.
+        progress: (planning time, cost) of each better solution that the planner came upon, (K, 2);
+            empty for planners that do not tell the cost of their best solution.
         iterations: evaluations of the termination condition, about one per iteration; None for
             planners that take no Python termination condition.
         nodes: states in the planner's tree or roadmap.
@@ -110,6 +114,7 @@ class PlanResult:
     simplify_s: float
     total_s: float
     first_solution_s: float | None
+    progress: NDArray[np.float64]
     iterations: int | None
     nodes: int
     draws: dict[str, int]
@@ -118,7 +123,9 @@ class PlanResult:
 
     def to_dict(self) -> dict[str, Any]:
         """The result as JSON-ready values; an infinite cost becomes None."""
-        values = {f.name: getattr(self, f.name) for f in fields(self) if f.metadata.get("json", True)}
+        values = {
+            f.name: getattr(self, f.name) for f in fields(self) if f.metadata.get("json", True)
+        }
         arrays = {k: v.tolist() for k, v in values.items() if isinstance(v, np.ndarray)}
         return values | arrays | {"cost": self.cost if isfinite(self.cost) else None}
 
@@ -164,7 +171,8 @@ def plan(
             default.
         heatmap: to be drawn from in place of the learned one, in this map's grid.
         simplify: let OMPL's path simplifier shorten the path afterwards.
-        goal_tolerance: how far from the goal a path may end, world units; by default a pixel.
+        goal_tolerance: how far from the goal a path may end, world units; by default a pixel. At 0
+            paths end in the goal itself.
         keep_tree: put the edges of the planner's tree into the result.
 
     Returns:
@@ -191,12 +199,8 @@ def plan(
         setup = _simple_setup(space_map, task, planner, range, tolerance)
         began = perf_counter()
         drawn_from = provide(space_map, *task) if provide is not None else None
-        inference_s = perf_counter() - began if provide is not None else 0.0
-        link = (
-            attach(setup, drawn_from, uniform_fraction, used_seed)
-            if drawn_from is not None
-            else None
-        )
+        link = drawn_from and attach(setup, drawn_from, uniform_fraction, used_seed)
+        inference_s = perf_counter() - began if link else 0.0
         try:
             run = _solve(setup, planner, time, iterations)
             simplify_s = _simplify(setup) if simplify and run.exact else 0.0
@@ -221,6 +225,7 @@ def plan(
                 simplify_s=simplify_s,
                 total_s=inference_s + run.planning_s + simplify_s,
                 first_solution_s=run.first_solution_s if path is not None else None,
+                progress=run.progress,
                 iterations=run.iterations,
                 nodes=int(data.numVertices()),
                 draws=dict(link.draws) if link else {"learned": 0, "uniform": 0},
@@ -296,7 +301,8 @@ def _simple_setup(
     start, goal = compat.new_state(space), compat.new_state(space)
     for state, point in ((start, task[0]), (goal, task[1])):
         state[0], state[1] = float(point[0]), float(point[1])
-    setup.setStartAndGoalStates(start, goal, float(tolerance))
+    # A goal is reached at less than its threshold; OMPL's own default is the least one as well.
+    setup.setStartAndGoalStates(start, goal, max(float(tolerance), _LEAST_THRESHOLD))
     instance = kind(si)
     if range is not None:
         if not hasattr(instance, "setRange"):
@@ -313,6 +319,7 @@ class _Run:
     status: str
     planning_s: float
     first_solution_s: float | None
+    progress: NDArray[np.float64]
     iterations: int | None
 
 
@@ -330,28 +337,35 @@ def _solve(setup: Any, name: str, time: float, iterations: int | None) -> _Run:
     began = perf_counter()
     status = setup.solve(condition)
     planning_s = perf_counter() - began
-    first = planning_s if name in _STOP_AT_FIRST else watch and watch.first_solution_s
-    exact = compat.is_exact(status)
-    return _Run(exact, str(status), planning_s, first, watch and watch.iterations)
+    progress = np.array(watch.progress if watch else []).reshape(-1, 2)
+    first = planning_s if name in _STOP_AT_FIRST else None
+    return _Run(
+        exact=compat.is_exact(status),
+        status=str(status),
+        planning_s=planning_s,
+        first_solution_s=float(progress[0, 0]) if len(progress) else first,
+        progress=progress,
+        iterations=watch.iterations if watch else None,
+    )
 
 
 class _Watch:
-    """The termination condition: counts iterations, and notes the first solution."""
+    """The termination condition: counts iterations, and notes each better solution."""
 
     def __init__(self, planner: Any, time: float, iterations: int | None) -> None:
         self.iterations = 0
-        self.first_solution_s: float | None = None
+        self.progress: list[tuple[float, float]] = []
         self._limit = inf if iterations is None else iterations
-        self._waiting = hasattr(planner, "bestCost")
-        self._planner = planner
+        self._planner = planner if hasattr(planner, "bestCost") else None
+        self._best = inf
         self._began = perf_counter()
         self._end = self._began + time
 
     def stop(self) -> bool:
         now = perf_counter()
-        if self._waiting and compat.best_cost(self._planner) < inf:
-            self.first_solution_s = now - self._began
-            self._waiting = False
+        if self._planner is not None and (cost := compat.best_cost(self._planner)) < self._best:
+            self._best = cost
+            self.progress.append((now - self._began, cost))
         if self.iterations >= self._limit or now >= self._end:
             return True
         self.iterations += 1

@@ -1,0 +1,120 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from cbagan_ompl import GridMap, Heatmap, tasks_of
+from cbagan_ompl.cli import main
+
+MAP = "bundled:walls_with_gaps"
+QUICK = ["plan", MAP, "--sampler", "corridor", "--planner", "RRT", "--time", "5", "--range", "20"]
+
+
+def test_plan_writes_picture_and_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    picture, report = tmp_path / "plan.png", tmp_path / "plan.json"
+    status = main([*QUICK, "--seed", "1", "--output", str(picture), "--json", str(report)])
+    printed = capsys.readouterr()
+    assert status == 0
+    assert printed.err == ""
+    assert str(picture) in printed.out
+    values = json.loads(report.read_text())
+    assert values["solved"] is True
+    assert values["sampler"] == "corridor"
+    assert f"{values['cost']:.6g}" in printed.out
+    grid = GridMap.load(MAP)
+    assert grid.path_is_free(values["path"])
+    task = tasks_of(MAP, grid)[0]
+    np.testing.assert_array_equal(values["start"], task.start)
+    image = cv2.imread(str(picture))
+    assert min(image.shape[:2]) > 500
+
+
+def test_learned_is_the_default(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", MAP, "--time", "0.5", "--range", "20", "--seed", "1"]) == 0
+    assert "learned, hook" in capsys.readouterr().out
+
+
+def test_start_and_goal_and_seed(tmp_path: Path) -> None:
+    grid = GridMap.load(MAP)
+    (x0, y0), (x1, y1) = (task := tasks_of(MAP, grid)[1]).start, task.goal
+    reports = []
+    for name in ("one.json", "two.json"):
+        ends = ["--start", f"{x0},{y0}", "--goal", f"{x1},{y1}", "--seed", "7"]
+        assert main([*QUICK, *ends, "--json", str(tmp_path / name)]) == 0
+        reports.append(json.loads((tmp_path / name).read_text()))
+    assert reports[0]["path"] == reports[1]["path"]
+    assert main([*QUICK, "--task", "1", "--seed", "7", "--json", str(tmp_path / "three.json")]) == 0
+    assert json.loads((tmp_path / "three.json").read_text())["path"] == reports[0]["path"]
+
+
+def test_heatmap_file(tmp_path: Path) -> None:
+    grid = GridMap.load(MAP)
+    task = tasks_of(MAP, grid)[0]
+    np.save(tmp_path / "heat.npy", Heatmap.corridor(grid, task.start, task.goal).values)
+    arguments = ["plan", MAP, "--heatmap", str(tmp_path / "heat.npy"), "--planner", "RRT"]
+    report = tmp_path / "plan.json"
+    assert main([*arguments, "--time", "5", "--json", str(report)]) == 0
+    assert json.loads(report.read_text())["sampler"] == "heatmap"
+
+
+def test_unsolved_is_status_1(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["plan", MAP, "--sampler", "uniform", "--iterations", "3", "--seed", "1"]
+    assert main(arguments) == 1
+    assert "solved         no" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["plan", "missing.png"], "missing.png"),
+        (["plan", "bundled:nothing"], "walls_with_gaps"),
+        (["plan", MAP, "--task", "99"], "tasks 0 to 3, there is no task 99"),
+        (["plan", MAP, "--task", "-1"], "there is no task -1"),
+        (["plan", MAP, "--start", "20,20"], "both --start and --goal"),
+        (["plan", MAP, "--task", "0", "--start", "1,1", "--goal", "2,2"], "--task alone"),
+        (["plan", MAP, "--planner", "Magic"], "no planner 'Magic'"),
+        (["plan", MAP, "--sampler", "magic"], "no sampler 'magic'"),
+        (["plan", MAP, "--heatmap", "missing.npy"], "missing.npy"),
+        (["plan", MAP, "--model", "missing.pt"], "missing.pt"),
+        (["plan", MAP, "--threshold", "7"], "threshold"),
+        ([*QUICK, "--output", "plan.xyz"], "suffix"),
+        ([*QUICK, "--output", "missing/plan.png"], "missing/plan.png"),
+        ([*QUICK, "--json", "missing/plan.json"], "missing/plan.json"),
+    ],
+)
+def test_bad_input_is_status_2(
+    arguments: list[str],
+    message: str,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
+    printed = capsys.readouterr()
+    assert message in printed.err
+    assert "Traceback" not in printed.err
+
+
+@pytest.mark.parametrize(
+    "arguments", [["plan", MAP, "--start", "1;2"], ["plan"], [], ["plan", MAP, "--bogus"]]
+)
+def test_usage_errors_are_status_2(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as exit_:
+        main(arguments)
+    assert exit_.value.code == 2
+    assert "usage: cbagan-ompl" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["plan", "train", "export"])
+def test_help(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as exit_:
+        main([command, "--help"])
+    assert exit_.value.code == 0
+    assert len(capsys.readouterr().out) > 500

@@ -1,0 +1,137 @@
+from __future__ import annotations
+
+import itertools
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+
+from cbagan_ompl.network.attention import (  # noqa: E402
+    AttentionBlock,
+    ChannelAttention,
+    SpatialAttention,
+)
+from cbagan_ompl.network.config import PRESETS  # noqa: E402
+from cbagan_ompl.network.discriminators import Discriminator  # noqa: E402
+from cbagan_ompl.network.encoding import (  # noqa: E402
+    map_image,
+    point_image,
+    region_image,
+    region_probability,
+)
+from cbagan_ompl.network.generator import Generator  # noqa: E402
+from cbagan_ompl.network.networks import make_generator  # noqa: E402
+
+SWITCHES = list(itertools.product([True, False], repeat=2))
+
+
+def parameters(module: torch.nn.Module) -> int:
+    return sum(parameter.numel() for parameter in module.parameters())
+
+
+@pytest.mark.parametrize("preset", sorted(PRESETS))
+def test_generator_is_smaller_than_the_papers(preset: str) -> None:
+    assert parameters(make_generator(PRESETS[preset])) <= 880_000
+
+
+@pytest.mark.parametrize("size", [(16, 16), (48, 32)])
+def test_generator_keeps_height_and_width(size: tuple[int, int]) -> None:
+    generator = Generator((4, 4, 6, 8)).eval()
+    image = generator(torch.zeros(2, 3, *size), torch.zeros(2, 3, *size), torch.zeros(2, 1, *size))
+    assert image.shape == (2, 3, *size)
+    assert image.abs().max() < 1
+
+
+@pytest.mark.parametrize("switches", SWITCHES)
+def test_ablations_of_attention(switches: tuple[bool, bool]) -> None:
+    names = [name for name, _ in Discriminator(4, *switches).named_parameters()]
+    names += [name for name, _ in Generator((4, 4, 4, 4), *switches).named_parameters()]
+    assert any(".channel." in name for name in names) is switches[0]
+    assert any(".spatial." in name for name in names) is switches[1]
+
+
+def test_attention_follows_the_papers_equations() -> None:
+    features = torch.randn(2, 8, 5, 7)
+    channel, spatial = ChannelAttention(8), SpatialAttention(8)
+    pooled = features.mean((2, 3))
+    hidden = torch.relu(pooled @ channel.reduce.weight[:, :, 0, 0].T + channel.reduce.bias)
+    weights = torch.sigmoid(hidden @ channel.expand.weight[:, :, 0, 0].T + channel.expand.bias)
+    torch.testing.assert_close(channel(features)[:, :, 0, 0], weights)
+    pixel = features[:, :, 3, 4]
+    hidden = torch.relu(pixel @ spatial.reduce.weight[:, :, 0, 0].T + spatial.reduce.bias)
+    weights = torch.sigmoid(hidden @ spatial.expand.weight[:, :, 0, 0].T + spatial.expand.bias)
+    torch.testing.assert_close(spatial(features)[:, :, 3, 4], weights)
+
+
+def test_attention_block_is_residual_around_both() -> None:
+    features, block = torch.randn(2, 8, 5, 7), AttentionBlock(8)
+    attended = block.channel(features) * features
+    expected = features + block.spatial(attended) * attended
+    torch.testing.assert_close(block(features), expected)
+    assert AttentionBlock(8, False, False)(features) is features
+
+
+def test_discriminator_judges_patches() -> None:
+    logits = Discriminator(4)(torch.zeros(2, 3, 64, 64), torch.zeros(2, 3, 64, 64))
+    assert logits.shape == (2, 1, 7, 7)
+
+
+def test_region_image_and_probability_are_inverse() -> None:
+    region = torch.rand(2, 1, 3, 4)
+    torch.testing.assert_close(region_probability(region_image(region)), region)
+    green = region_image(torch.ones(1, 1, 1, 1)).flatten().tolist()
+    white = region_image(torch.zeros(1, 1, 1, 1)).flatten().tolist()
+    assert (green, white) == ([-1, 1, -1], [1, 1, 1])
+
+
+def test_map_image_is_white_where_free() -> None:
+    free = torch.tensor([[[[1.0, 0.0]]]])
+    assert map_image(free)[0, :, 0].T.tolist() == [[1, 1, 1], [-1, -1, -1]]
+
+
+def test_point_image_has_a_red_start_and_a_blue_goal() -> None:
+    image = point_image(torch.tensor([[3.5, 2.5]]), torch.tensor([[9.5, 5.5]]), 8, 13)[0]
+    assert image.shape == (3, 8, 13)
+    assert image[:, 2, 3].tolist() == [1, -1, -1]
+    assert image[:, 5, 9].tolist() == [-1, -1, 1]
+    assert image[:, 0, 12].tolist() == [1, 1, 1]
+    assert (image[2, :, :7] < 0).sum() == 9
+
+
+def test_spots_move_with_the_fraction_of_a_pixel() -> None:
+    goal = torch.tensor([[20.0, 20.0]])
+    left, right = (point_image(torch.tensor([[u, 8.0]]), goal, 32, 32) for u in (8.1, 8.4))
+    assert not torch.equal(left, right)
+
+
+def test_the_package_does_not_import_torch() -> None:
+    code = (
+        "import sys, cbagan_ompl, cbagan_ompl.network.cli, cbagan_ompl.network.metrics;"
+        "from cbagan_ompl.network.predictor import load_model;"
+        "sys.exit('torch' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_without_torch_the_message_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from cbagan_ompl import MissingDependencyError
+    from cbagan_ompl.network.predictor import load_model
+
+    monkeypatch.setitem(sys.modules, "torch", None)
+    with pytest.raises(MissingDependencyError, match=r"pip install 'cbagan-ompl\[torch\]'"):
+        load_model()
+
+
+def test_encoding_matches_a_slow_reference() -> None:
+    start, goal = (5.2, 3.9), (10.0, 9.0)
+    image = point_image(torch.tensor([start]), torch.tensor([goal]), 12, 16)[0].numpy()
+    for row, column in np.ndindex(12, 16):
+        distance = np.hypot(column + 0.5 - start[0], row + 0.5 - start[1])
+        assert image[2, row, column] == pytest.approx(
+            1 - 2 * np.clip(2.5 - distance, 0, 1), abs=1e-5
+        )

@@ -1,0 +1,378 @@
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from training_set import SIDE, write_training_set
+
+torch = pytest.importorskip("torch")
+
+from cbagan_ompl import ConfigError, DatasetError, ModelError  # noqa: E402
+from cbagan_ompl.network import training  # noqa: E402
+from cbagan_ompl.network.checkpoints import load_checkpoint  # noqa: E402
+from cbagan_ompl.network.cli import add_export_parser, add_train_parser  # noqa: E402
+from cbagan_ompl.network.config import TrainingConfig  # noqa: E402
+from cbagan_ompl.network.dataset import (  # noqa: E402
+    Dataset,
+    load_dataset,
+    make_batch,
+    transformed,
+)
+from cbagan_ompl.network.networks import Networks, encode  # noqa: E402
+from cbagan_ompl.network.training import (  # noqa: E402
+    discriminator_step,
+    generator_step,
+    learning_rate_factor,
+    train,
+)
+
+TINY = TrainingConfig(
+    epochs=2, batch_size=4, widths=(4, 4, 6, 8), discriminator_width=4, adversarial_every=2
+)
+CPU = torch.device("cpu")
+NETWORKS = ("generator", "map_discriminator", "point_discriminator")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_training_set(tmp_path_factory.mktemp("data") / "tiny")
+
+
+@pytest.fixture(scope="module")
+def dataset(folder: Path) -> Dataset:
+    return load_dataset(folder)
+
+
+def weights(networks: Networks) -> dict[str, list[torch.Tensor]]:
+    return {
+        name: [p.detach().clone() for p in getattr(networks, name).parameters()]
+        for name in NETWORKS
+    }
+
+
+def changed(before: list[torch.Tensor], after: list[torch.Tensor]) -> bool:
+    return any(not torch.equal(a, b) for a, b in zip(before, after, strict=True))
+
+
+def test_each_optimizer_owns_its_network_alone() -> None:
+    networks = Networks(TINY, CPU)
+    owned = {
+        name: {id(p) for group in optimizer.param_groups for p in group["params"]}
+        for name, optimizer in networks.optimizers.items()
+    }
+    for name in NETWORKS:
+        assert owned[name] == {id(p) for p in getattr(networks, name).parameters()}
+    assert len(set.union(*owned.values())) == sum(map(len, owned.values()))
+
+
+def test_steps_change_the_weights_that_they_teach(dataset: Dataset) -> None:
+    networks = Networks(TINY, CPU)
+    batch = make_batch(dataset.train, np.arange(4), CPU)
+    images = encode(batch)
+    before = weights(networks)
+    fake = networks.generator(images.map, images.points, torch.zeros_like(batch.free))
+
+    discriminator_step(networks, images, fake)
+    after = weights(networks)
+    assert [changed(before[name], after[name]) for name in NETWORKS] == [False, True, True]
+
+    parts = generator_step(networks, TINY, batch, images, fake, adversarial=True)
+    assert parts["adversarial"] > 0
+    last = weights(networks)
+    assert [changed(after[name], last[name]) for name in NETWORKS] == [True, False, False]
+    assert all(p.requires_grad for p in networks.map_discriminator.parameters())
+
+
+def test_the_discriminators_reach_the_generator(dataset: Dataset) -> None:
+    config = TINY.updated({"pixel_weight": 0, "bce_weight": 0, "dice_weight": 0})
+    networks = Networks(config.updated({"weight_decay": 0}), CPU)
+    batch = make_batch(dataset.train, np.arange(4), CPU)
+    images = encode(batch)
+    before = weights(networks)["generator"]
+    fake = networks.generator(images.map, images.points, torch.zeros_like(batch.free))
+    generator_step(networks, config, batch, images, fake, adversarial=True)
+    assert changed(before, weights(networks)["generator"])
+
+
+def test_average_follows_the_generator() -> None:
+    networks = Networks(TINY, CPU)
+    with torch.no_grad():
+        for parameter in networks.generator.parameters():
+            parameter.add_(1)
+    start = next(networks.average.parameters()).clone()
+    networks.update_average(0.75, step=1000)
+    torch.testing.assert_close(next(networks.average.parameters()), start + 0.25)
+
+
+def equal(a: Any, b: Any) -> bool:
+    if isinstance(a, torch.Tensor):
+        return torch.equal(a, b)
+    if isinstance(a, dict):
+        return a.keys() == b.keys() and all(equal(a[key], b[key]) for key in a)
+    if isinstance(a, list | tuple):
+        return len(a) == len(b) and all(map(equal, a, b))
+    return bool(a == b)
+
+
+def test_resumed_run_equals_uninterrupted(
+    dataset: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = train(dataset, TINY, tmp_path / "whole", device="cpu", progress=False)
+
+    epochs = training._train_epoch
+
+    def interrupted(*args: Any) -> dict[str, float]:
+        if args[4] == 1:
+            raise KeyboardInterrupt
+        return epochs(*args)
+
+    monkeypatch.setattr(training, "_train_epoch", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        train(dataset, TINY, tmp_path / "parts", device="cpu", progress=False)
+    assert len((tmp_path / "parts" / "log.jsonl").read_text().splitlines()) == 1
+    monkeypatch.undo()
+    parts = train(dataset, TINY, tmp_path / "parts", resume=True, device="cpu", progress=False)
+
+    assert parts["test"] == whole["test"]
+    states = [load_checkpoint(tmp_path / run / "last.pt") for run in ("whole", "parts")]
+    for key in ("networks", "rng", "noise_rng", "config", "dataset"):
+        assert equal(states[0][key], states[1][key]), key
+    assert [entry["losses"] for entry in states[0]["history"]] == [
+        entry["losses"] for entry in states[1]["history"]
+    ]
+
+
+def test_training_learns(dataset: Dataset, tmp_path: Path) -> None:
+    # The region turns the same way in every task, so mirrored tasks would contradict each other.
+    config = TINY.updated(
+        {"epochs": 30, "generator_lr": 0.01, "ema_decay": 0.5, "symmetries": False}
+        | {"reversal": False}
+    )
+    result = train(dataset, config, tmp_path, device="cpu", progress=False)
+    assert result["test"]["iou"] > result["trivial"]["straight line"]["iou"] + 0.1
+    log = [json.loads(line) for line in (tmp_path / "log.jsonl").read_text().splitlines()]
+    assert len(log) == 30
+    assert {"adversarial", "map_discriminator", "point_discriminator"} <= log[-1]["losses"].keys()
+    assert log[-1]["losses"]["segmentation"] < log[0]["losses"]["segmentation"] / 2
+
+
+def test_resume_refuses_another_recipe(dataset: Dataset, tmp_path: Path) -> None:
+    config = TINY.updated({"epochs": 1})
+    train(dataset, config, tmp_path, device="cpu", progress=False)
+    with pytest.raises(ConfigError, match="resume"):
+        train(dataset, config, tmp_path, device="cpu", progress=False)
+    with pytest.raises(ConfigError, match="seed"):
+        train(dataset, config.updated({"seed": 1}), tmp_path, resume=True, progress=False)
+
+
+def test_resume_without_a_run(dataset: Dataset, tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match="no such file"):
+        train(dataset, TINY, tmp_path, resume=True, progress=False)
+
+
+def test_output_that_is_a_file(dataset: Dataset, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(ConfigError, match="cannot make the folder"):
+        train(dataset, TINY, tmp_path / "file", progress=False)
+
+
+def test_checkpoint_that_is_none(dataset: Dataset, tmp_path: Path) -> None:
+    (tmp_path / "last.pt").write_text("text")
+    with pytest.raises(ModelError, match="not a training checkpoint, or a damaged one"):
+        train(dataset, TINY, tmp_path, resume=True, progress=False)
+
+
+def test_unknown_device() -> None:
+    with pytest.raises(ConfigError, match="nonsense"):
+        training.pick_device("nonsense")
+
+
+def test_learning_rates() -> None:
+    cycle = [learning_rate_factor(TINY.updated({"epochs": 10}), step, 10) for step in range(100)]
+    assert max(cycle) == cycle[10] == 1
+    assert cycle[0] < 0.1
+    assert cycle[-1] < 0.001
+    paper = TrainingConfig.preset("paper")
+    assert learning_rate_factor(paper, 9, 10) == 1
+    assert learning_rate_factor(paper, 25, 10) == paper.decay**2
+
+
+# --- the data set ---------------------------------------------------------------------------------
+
+
+def test_dataset_content(dataset: Dataset) -> None:
+    assert (len(dataset.train), len(dataset.test)) == (16, 4)
+    assert dataset.description()["side"] == SIDE
+    tasks = dataset.test
+    for i in range(len(tasks)):
+        (u, v), (column, row) = tasks.start[i], tasks.goal[i].astype(int)
+        assert (u, v % 1) == (2.5, 0.5)
+        assert tasks.region[i, int(v), 2] == tasks.region[i, row, column] == 1
+        assert not tasks.free[i, 15, 15]
+        assert tasks.free[i, 0, 0]
+
+
+def test_split_is_seeded_and_disjoint(dataset: Dataset) -> None:
+    (a, b), (c, d) = dataset.split(0.25, 3), dataset.split(0.25, 3)
+    assert (len(a), len(b)) == (12, 4)
+    assert np.array_equal(a.region, c.region)
+    assert np.array_equal(b.region, d.region)
+    everything = np.concatenate((a.goal, b.goal))
+    assert sorted(everything.tolist()) == sorted(dataset.train.goal.tolist())
+
+
+def test_symmetries_move_points_with_the_images(dataset: Dataset) -> None:
+    tasks = dataset.train
+    free, region = tasks.maps[tasks.map_of[0]], tasks.region[0]
+    ends = np.stack((tasks.start[0], tasks.goal[0]))
+    seen = set()
+    for code in range(8):
+        turned_free, turned, moved = transformed(code, free, region, ends)
+        assert turned.sum() == region.sum()
+        for before, after in zip(ends.astype(int), moved.astype(int), strict=True):
+            assert turned[after[1], after[0]] == region[before[1], before[0]]
+        seen.add((turned_free.tobytes(), turned.tobytes()))
+    assert len(seen) == 8
+
+
+def test_augmented_batches_are_seeded(dataset: Dataset) -> None:
+    def draw(seed: int) -> torch.Tensor:
+        rng = np.random.default_rng(seed)
+        batch = make_batch(dataset.train, np.arange(8), CPU, rng, symmetries=True, reversal=True)
+        return torch.cat((batch.start, batch.goal, batch.region.flatten(1)), 1)
+
+    assert torch.equal(draw(0), draw(0))
+    assert not torch.equal(draw(0), draw(1))
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (lambda root: (root / "train.csv").unlink(), "train.csv"),
+        (lambda root: (root / "test.csv").write_text("map,task\na,b\n"), "column roi is missing"),
+        (lambda root: (root / "test.csv").write_text("map,task,roi\n"), "empty"),
+        (lambda root: (root / "maps" / "map_1.png").unlink(), "map_1.png"),
+        (lambda root: (root / "tasks/map_0/task_1_roi.png").write_bytes(b"text"), "not an image"),
+        (
+            lambda root: cv2.imwrite(
+                str(root / "tasks/map_0/task_1_roi.png"), np.zeros((8, 9, 3), np.uint8)
+            ),
+            "9 x 8 pixels",
+        ),
+        (
+            lambda root: cv2.imwrite(
+                str(root / "tasks/map_0/task_1.png"), np.full((SIDE, SIDE, 3), 255, np.uint8)
+            ),
+            "start is missing",
+        ),
+        (
+            lambda root: cv2.imwrite(
+                str(root / "maps/map_0.png"), np.full((20, 20, 3), 255, np.uint8)
+            ),
+            "multiple of 16",
+        ),
+    ],
+)
+def test_damaged_sets(tmp_path: Path, damage: Any, message: str) -> None:
+    root = write_training_set(tmp_path / "set")
+    damage(root)
+    with pytest.raises(DatasetError, match=message):
+        load_dataset(root)
+
+
+def test_missing_folder(tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match="no such folder"):
+        load_dataset(tmp_path / "none")
+
+
+# --- the recipe -----------------------------------------------------------------------------------
+
+
+def test_paper_preset_is_the_papers_table() -> None:
+    paper = TrainingConfig.preset("paper")
+    assert (paper.epochs, paper.batch_size, paper.generator_lr) == (20, 8, 1e-4)
+    assert paper.map_discriminator_lr == paper.point_discriminator_lr == 5e-5
+    assert (paper.beta1, paper.beta2, paper.schedule) == (0.5, 0.999, "exponential")
+
+
+@pytest.mark.parametrize("suffix", [".json", ".yaml"])
+def test_config_file_round_trip(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"recipe{suffix}"
+    path.write_text(json.dumps(TINY.to_dict()))
+    assert TrainingConfig.from_file(path) == TINY
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("epochs: 0", "epochs must be at least 1"),
+        ("epoch: 3", "unknown option 'epoch'"),
+        ("epochs: many", "epochs must be a value of type int"),
+        ("epochs: true", "epochs must be"),
+        ("widths: [1, 2]", "widths are four"),
+        ("schedule: none", "one-cycle, exponential"),
+        ("generator_lr: fast", "generator_lr"),
+        ("beta1: .nan", "beta1"),
+        ("[1, 2]", "holds lines such as"),
+        ("a: [", "neither JSON nor YAML"),
+    ],
+)
+def test_bad_config_files(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "recipe.yaml"
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=message):
+        TrainingConfig.from_file(path)
+
+
+def test_unreadable_config_and_unknown_preset(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="cannot read"):
+        TrainingConfig.from_file(tmp_path / "none.yaml")
+    with pytest.raises(ConfigError, match="default, paper"):
+        TrainingConfig.preset("best")
+
+
+def test_numbers_that_yaml_reads_as_text() -> None:
+    assert TrainingConfig().updated({"generator_lr": "1e-4"}).generator_lr == 1e-4
+
+
+# --- the commands ---------------------------------------------------------------------------------
+
+
+def parse(*words: str) -> argparse.Namespace:
+    parser = argparse.ArgumentParser()
+    commands = parser.add_subparsers()
+    add_train_parser(commands)
+    add_export_parser(commands)
+    return parser.parse_args(words)
+
+
+def test_train_and_export_commands(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recipe = tmp_path / "recipe.yaml"
+    recipe.write_text("widths: [4, 4, 6, 8]\nbatch_size: 8\n")
+    words = ["train", str(folder), "--output", str(tmp_path / "run"), "--config", str(recipe)]
+    words += ["--set", "discriminator_width=4", "batch_size=4", "--epochs", "1"]
+    words += ["--device", "cpu", "--json", str(tmp_path / "scores.json")]
+    args = parse(*words)
+    assert args.run(args) == 0
+    assert "straight line" in capsys.readouterr().out
+    assert 0 <= json.loads((tmp_path / "scores.json").read_text())["test"]["iou"] <= 1
+    state = load_checkpoint(tmp_path / "run" / "best.pt")
+    assert (state["config"]["batch_size"], state["config"]["epochs"]) == (4, 1)
+
+    args = parse("export", str(tmp_path / "run/best.pt"), "--output", str(tmp_path / "tiny.pt"))
+    assert args.run(args) == 0
+    assert {"tiny.pt", "tiny.md", "manifest.json"} <= {p.name for p in tmp_path.iterdir()}
+
+
+@pytest.mark.parametrize("words", [["--set", "epochs"], ["--set", "epoch=1"], ["--threads", "0"]])
+def test_bad_train_options(folder: Path, tmp_path: Path, words: list[str]) -> None:
+    args = parse("train", str(folder), "--output", str(tmp_path), *words)
+    with pytest.raises(ConfigError):
+        args.run(args)
