@@ -20,6 +20,7 @@ from ..heatmap import Heatmap
 from . import compat
 from .attach import attach
 from .compat import og, ou
+from .hooks import hook_of
 from .validity import GridMotionValidator, GridValidityChecker
 
 if TYPE_CHECKING:
@@ -191,12 +192,15 @@ def plan(
     task = space_map.check_task(start, goal)
     tolerance = space_map.resolution if goal_tolerance is None else goal_tolerance
     _check_options(time, iterations, range, tolerance, seed)
+    kind = compat.planner_class(planner)
+    if sampler != "uniform":
+        hook_of(planner)
     used_seed = secrets.randbits(32) if seed is None else seed
     name, provide = _provider(sampler, model, heatmap)
 
     with compat.log_level(ou.LOG_ERROR):
         compat.seed_ompl(used_seed)
-        setup = _simple_setup(space_map, task, planner, range, tolerance)
+        setup = _simple_setup(space_map, task, kind, range, tolerance)
         began = perf_counter()
         drawn_from = provide(space_map, *task) if provide is not None else None
         link = drawn_from and attach(setup, drawn_from, uniform_fraction, used_seed)
@@ -288,11 +292,10 @@ def _provider(
 def _simple_setup(
     grid: GridMap,
     task: tuple[NDArray[np.float64], NDArray[np.float64]],
-    planner: str,
+    kind: Any,
     range: float | None,
     tolerance: float,
 ) -> Any:
-    kind = compat.planner_class(planner)
     space = compat.plane_space(*grid.bounds)
     setup = og.SimpleSetup(space)
     si = setup.getSpaceInformation()
@@ -306,7 +309,7 @@ def _simple_setup(
     instance = kind(si)
     if range is not None:
         if not hasattr(instance, "setRange"):
-            raise ConfigError(f"{planner} has no range to set: leave it out")
+            raise ConfigError(f"{kind.__name__} has no range to set: leave it out")
         instance.setRange(float(range))
     setup.setPlanner(instance)
     setup.setup()
