@@ -49,6 +49,9 @@ class DrawStream:
     distribution over free space, so that every free pixel keeps a positive probability and the
     planner stays probabilistically complete.
 
+    Attributes:
+        rng: the generator of the draws, and of whatever else belongs to the same run.
+
     Args:
         heatmap: where to draw.
         uniform_fraction: in (0, 1].
@@ -73,7 +76,7 @@ class DrawStream:
         self.uniform_fraction = float(uniform_fraction)
         self.learned = 0
         self.uniform = 0
-        self._rng = np.random.default_rng(seed)
+        self.rng = np.random.default_rng(seed)
         self._parts = (_Part(heatmap), _Part(Heatmap.uniform(heatmap.grid)))
         self._batch = _FIRST_BATCH
         self._pending: list[tuple[float, float, float, bool]] = []
@@ -118,12 +121,12 @@ class DrawStream:
 
     def near(self, x: float, y: float, distance: float) -> tuple[float, float]:
         """A draw within ``distance`` of (x, y) along each axis (OMPL's box neighbourhood)."""
-        offsets = self._rng.uniform(-distance, distance, (_LOCAL_CANDIDATES, 2))
+        offsets = self.rng.uniform(-distance, distance, (_LOCAL_CANDIDATES, 2))
         return self._pick(np.array((x, y)) + offsets)
 
     def gaussian(self, x: float, y: float, deviation: float) -> tuple[float, float]:
         """A draw around (x, y) with the given standard deviation along each axis."""
-        return self._pick(self._rng.normal((x, y), deviation, (_LOCAL_CANDIDATES, 2)))
+        return self._pick(self.rng.normal((x, y), deviation, (_LOCAL_CANDIDATES, 2)))
 
     def _inform(self, informed: InformedSet | None) -> None:
         self._informed = informed
@@ -135,14 +138,14 @@ class DrawStream:
         """Resample one of the candidates by its heat, or the first one as the uniform draw."""
         grid = self.heatmap.grid
         chosen, uniform = 0, True
-        if self._rng.random() >= self.uniform_fraction:
+        if self.rng.random() >= self.uniform_fraction:
             free = grid.is_free(candidates)
             columns, rows = grid.to_pixel(candidates[free]).astype(np.intp).T
             heat = np.zeros(len(candidates))
             heat[free] = self.heatmap.values[rows, columns]
             cumulative = heat.cumsum()
             if cumulative[-1] > 0:
-                threshold = self._rng.random() * cumulative[-1]
+                threshold = self.rng.random() * cumulative[-1]
                 chosen = int(np.searchsorted(cumulative, threshold, side="right"))
                 uniform = False
         x, y = candidates[chosen].tolist()
@@ -157,10 +160,10 @@ class DrawStream:
 
     def _refill(self, best: float) -> None:
         size, self._batch = self._batch, min(2 * self._batch, _LARGEST_BATCH)
-        uniform = self._rng.random(size) < self.uniform_fraction
+        uniform = self.rng.random(size) < self.uniform_fraction
         points = np.empty((size, 2))
         for part, mask in zip(self._parts, (~uniform, uniform), strict=True):
-            points[mask] = part.draw(int(mask.sum()), best, self._rng)
+            points[mask] = part.draw(int(mask.sum()), best, self.rng)
         if self._informed is None:
             bounds = np.full(size, -inf)
         else:

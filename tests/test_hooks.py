@@ -285,3 +285,23 @@ def test_subclass_of_a_planner_is_known_by_its_base(two_walls: GridMap, corridor
     with attach(setup, corridor, seed=0) as link:
         setup.solve(0.2)
         assert link.draws["learned"] > 20
+
+
+@pytest.mark.parametrize("planner", ["RRT", "RRTstar"])
+def test_same_seed_same_poses(two_walls: GridMap, corridor: Heatmap, planner: str) -> None:
+    """Headings come from the same generator as positions."""
+    runs = []
+    for _ in range(2):
+        compat.seed_ompl(3)
+        space = ob.SE2StateSpace()
+        bounds = ob.RealVectorBounds(2)
+        bounds.setLow(0.0)
+        bounds.setHigh(256.0)
+        space.setBounds(bounds)
+        setup = make_setup(two_walls, planner, space)
+        with attach(setup, corridor, seed=3):
+            setup.solve(until(lambda: False, limit=150)[0])
+            path = setup.getSolutionPath()
+            states = [path.getState(i) for i in range(path.getStateCount())]
+            runs.append([(s.getX(), s.getY(), s.getYaw()) for s in states])
+    assert runs[0] == runs[1]

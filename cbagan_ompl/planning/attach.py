@@ -97,13 +97,12 @@ def attach(
         raise PlannerError("attach needs the task: set the start and the goal of the setup first")
     name = _class_name(planner)
     hook = hook_of(name)
-    generator = np.random.default_rng(seed)
-    stream = DrawStream(heatmap, uniform_fraction, generator)
-    positions = positions_of(setup.getStateSpace(), generator)
+    stream = DrawStream(heatmap, uniform_fraction, seed)
+    positions = positions_of(setup.getStateSpace(), stream.rng)
     progress = PlannerProgress(setup, positions)
     if name in INFORMED:
         stream.follow(progress.path_length, progress.informed_set)
-    undo_hook = _INSTALL[hook](_Parts(setup, planner, positions, stream, progress, generator))
+    undo_hook = _INSTALL[hook](_Parts(setup, planner, positions, stream, progress))
 
     def undo() -> None:
         progress.release()
@@ -131,7 +130,6 @@ class _Parts:
     positions: Positions
     stream: DrawStream
     progress: PlannerProgress
-    rng: np.random.Generator
 
 
 def _use_state_sampler(parts: _Parts) -> Callable[[], None]:
@@ -173,16 +171,8 @@ def _use_valid_state_sampler(parts: _Parts) -> Callable[[], None]:
 def _inject_goals(parts: _Parts) -> Callable[[], None]:
     setup, planner = parts.setup, parts.planner
     original, bias = setup.getGoal(), planner.getGoalBias()
-    setup.setGoal(
-        InjectedGoal(
-            setup.getSpaceInformation(),
-            original,
-            parts.positions,
-            parts.stream,
-            parts.progress,
-            parts.rng,
-        )
-    )
+    si = setup.getSpaceInformation()
+    setup.setGoal(InjectedGoal(si, original, parts.positions, parts.stream, parts.progress))
     planner.setGoalBias(1.0)
 
     def undo() -> None:

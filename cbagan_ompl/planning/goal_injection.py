@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from ..draws import DrawStream
 from ..errors import PlannerError
 from .compat import ob
@@ -32,7 +30,6 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
         positions: access to the positions of the states.
         stream: the draws.
         progress: what is known of the planner.
-        seed: seed or generator of the goal bias.
     """
 
     def __init__(
@@ -42,7 +39,6 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
         positions: Positions,
         stream: DrawStream,
         progress: PlannerProgress,
-        seed: int | np.random.Generator | None,
     ) -> None:
         super().__init__(si)
         if not isinstance(original, ob.GoalSampleableRegion):
@@ -55,7 +51,6 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
         self._positions = positions
         self._stream = stream
         self._progress = progress
-        self._rng = np.random.default_rng(seed)
 
     def distanceGoal(self, state: Any) -> float:  # noqa: N802
         """Distance to the original goal."""
@@ -74,7 +69,7 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
         progress = self._progress
         sampling = progress.is_sampling
         progress.note_sample()
-        if not sampling or (not progress.has_solution and self._rng.random() < _GOAL_BIAS):
+        if not sampling or (not progress.has_solution and self._stream.rng.random() < _GOAL_BIAS):
             self._original.sampleGoal(state)
         else:
             self._positions.write(state, *self._stream.next())

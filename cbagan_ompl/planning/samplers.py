@@ -41,8 +41,8 @@ class HeatmapStateSampler(ob.StateSampler):  # type: ignore[misc]
     ) -> None:
         super().__init__(space)
         self._space = space
-        self._positions = positions_of(space, seed)
         self._stream = stream or DrawStream(heatmap, uniform_fraction, seed)
+        self._positions = positions_of(space, self._stream.rng)
 
     @property
     def draws(self) -> dict[str, int]:
@@ -97,8 +97,8 @@ class HeatmapValidStateSampler(ob.ValidStateSampler):  # type: ignore[misc]
         super().__init__(si)
         self._si = si
         self._space = si.getStateSpace()
-        self._positions = positions_of(self._space, seed)
         self._stream = stream or DrawStream(heatmap, uniform_fraction, seed)
+        self._positions = positions_of(self._space, self._stream.rng)
 
     @property
     def draws(self) -> dict[str, int]:
