@@ -43,7 +43,9 @@ class TrainingConfig:
         dice_weight: factor of the Dice loss.
         dice_smooth: smoothing term of the Dice loss.
         symmetries: turn and mirror each task at random (8 symmetries of the square).
-        reversal: exchange start and goal at random.
+        reversal: exchange start and goal at random. Only for regions that do not depend on which
+            is which: those of the paper's data set grew from one end, and there it costs
+            0.04 of IoU.
         ema_decay: validate and export a moving average of the generator with this decay a step;
             0 turns it off.
         validation_fraction: share of the training tasks that is held back for validation.
@@ -53,8 +55,8 @@ class TrainingConfig:
     epochs: int = 26
     batch_size: int = 32
     generator_lr: float = 2e-3
-    map_discriminator_lr: float = 5e-4
-    point_discriminator_lr: float = 5e-4
+    map_discriminator_lr: float = 5e-5
+    point_discriminator_lr: float = 5e-5
     beta1: float = 0.9
     beta2: float = 0.999
     weight_decay: float = 0.01
@@ -66,13 +68,13 @@ class TrainingConfig:
     spatial_attention: bool = True
     discriminator_width: int = 32
     adversarial_every: int = 6
-    adversarial_weight: float = 0.1
+    adversarial_weight: float = 0.05
     pixel_weight: float = 20.0
     bce_weight: float = 1.0
     dice_weight: float = 10.0
     dice_smooth: float = 1.0
     symmetries: bool = True
-    reversal: bool = True
+    reversal: bool = False
     ema_decay: float = 0.998
     validation_fraction: float = 0.05
     seed: int = 0
@@ -86,10 +88,10 @@ class TrainingConfig:
         if len(self.widths) != 4 or min(self.widths) < 1:
             raise ConfigError(f"widths are four positive channel counts, got {self.widths}")
         if self.schedule not in SCHEDULES:
-            raise ConfigError(
-                f"schedule is one of {', '.join(SCHEDULES)}, got {self.schedule!r}"
-            )
-        for name in ("epochs", "batch_size", "discriminator_width", "adversarial_every"):
+            raise ConfigError(f"schedule is one of {', '.join(SCHEDULES)}, got {self.schedule!r}")
+        # Batch norm needs two tasks where the coarsest stage has one pixel.
+        self._check("batch_size", self.batch_size >= 2, "at least 2")
+        for name in ("epochs", "discriminator_width", "adversarial_every"):
             self._check(name, getattr(self, name) >= 1, "at least 1")
         for name in ("generator_lr", "map_discriminator_lr", "point_discriminator_lr", "decay"):
             self._check(name, getattr(self, name) > 0, "positive")
@@ -190,7 +192,6 @@ PRESETS: dict[str, TrainingConfig] = {
         schedule="exponential",
         adversarial_every=1,
         adversarial_weight=0.5,
-        reversal=False,
         ema_decay=0.0,
     ),
 }

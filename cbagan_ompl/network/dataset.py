@@ -17,6 +17,7 @@ import csv
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -81,6 +82,16 @@ class Dataset:
     train: Tasks
     test: Tasks
 
+    def description(self) -> dict[str, Any]:
+        """What checkpoints and model files say about the data."""
+        return {
+            "name": self.name,
+            "maps": len(self.train.maps),
+            "side": self.train.side,
+            "train_tasks": len(self.train),
+            "test_tasks": len(self.test),
+        }
+
     def split(self, fraction: float, seed: int) -> tuple[Tasks, Tasks]:
         """The training tasks in two random parts: for training, and for validation.
 
@@ -91,10 +102,10 @@ class Dataset:
         Raises:
             DatasetError: there are too few tasks to split.
         """
-        if len(self.train) < 2:
-            raise DatasetError(f"{self.name}: train.csv lists fewer than two tasks")
+        if len(self.train) < 3:
+            raise DatasetError(f"{self.name}: train.csv lists fewer than three tasks")
         order = np.random.default_rng(seed).permutation(len(self.train))
-        held_back = min(max(1, round(fraction * len(order))), len(order) - 1)
+        held_back = min(max(1, round(fraction * len(order))), len(order) - 2)
         return self.train.select(np.sort(order[held_back:])), self.train.select(
             np.sort(order[:held_back])
         )

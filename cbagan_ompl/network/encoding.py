@@ -10,13 +10,11 @@ which is why they are TorchScript. Images are (B, 3, H, W), red, green, blue, in
 
 from __future__ import annotations
 
-from typing import Final
-
 import torch
 from torch import Tensor
 
 #: Radius of the start and goal spots in pixels. A single pixel would be lost in the first stride.
-SPOT_RADIUS: Final[float] = 2.0
+SPOT_RADIUS = 2.0
 
 
 def map_image(free: Tensor) -> Tensor:
@@ -49,13 +47,14 @@ def point_image(start: Tensor, goal: Tensor, height: int, width: int) -> Tensor:
     return 1 - 2 * torch.cat((blue, torch.maximum(red, blue), red), 1)
 
 
-def spot(point: Tensor, height: int, width: int) -> Tensor:
-    """A disc of ``SPOT_RADIUS`` pixels around each point, its edge one pixel soft.
+def spot(point: Tensor, height: int, width: int, radius: float = SPOT_RADIUS) -> Tensor:
+    """A disc around each point, its edge one pixel soft.
 
     Args:
         point: (B, 2), pixel coordinates (u, v).
         height: H of the image.
         width: W of the image.
+        radius: of the disc in pixels. A default, since TorchScript reads no module constants.
 
     Returns:
         (B, 1, H, W) in [0, 1].
@@ -65,7 +64,7 @@ def spot(point: Tensor, height: int, width: int) -> Tensor:
     across = (columns - point[:, :1]).view(-1, 1, 1, width)
     down = (rows - point[:, 1:]).view(-1, 1, height, 1)
     distance = torch.sqrt(across * across + down * down)
-    return torch.clamp(SPOT_RADIUS + 0.5 - distance, 0.0, 1.0)
+    return torch.clamp(radius + 0.5 - distance, 0.0, 1.0)
 
 
 def region_image(region: Tensor) -> Tensor:

@@ -89,7 +89,8 @@ class UpBlock(nn.Module):
     def forward(self, features: Tensor, skip: Tensor) -> Tensor:
         """(B, C_in, H, W) and (B, C_out, 2 H, 2 W) -> (B, C_out, 2 H, 2 W)."""
         upsampled = functional.interpolate(self.project(features), scale_factor=2.0, mode="nearest")
-        return self.block(upsampled + skip)
+        result: Tensor = self.block(upsampled + skip)
+        return result
 
 
 class Generator(nn.Module):

@@ -6,7 +6,7 @@ them praises an empty prediction. Here an empty prediction scores 0.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -55,16 +55,12 @@ def confusion(predicted: NDArray[np.bool_], truth: NDArray[np.bool_]) -> Confusi
     """
 
     def count(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
-        return np.count_nonzero(mask, axis=(1, 2))
+        return np.asarray(np.count_nonzero(mask, axis=(1, 2)), dtype=np.int64)
 
-    return Confusion(
-        count(predicted & truth), count(predicted & ~truth), count(~predicted & truth)
-    )
+    return Confusion(count(predicted & truth), count(predicted & ~truth), count(~predicted & truth))
 
 
-def joins(
-    region: NDArray[np.bool_], start: tuple[int, int], goal: tuple[int, int]
-) -> bool:
+def joins(region: NDArray[np.bool_], start: tuple[int, int], goal: tuple[int, int]) -> bool:
     """Whether one 8-connected part of the region holds both start and goal.
 
     Args:
@@ -82,8 +78,8 @@ def region_scores(
     predicted: NDArray[np.bool_],
     truth: NDArray[np.bool_],
     free: NDArray[np.bool_],
-    start: NDArray[np.float64],
-    goal: NDArray[np.float64],
+    start: NDArray[np.floating[Any]],
+    goal: NDArray[np.floating[Any]],
 ) -> dict[str, float]:
     """All scores of predicted regions.
 

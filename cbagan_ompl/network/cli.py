@@ -1,0 +1,167 @@
+"""The commands ``train`` and ``export``; running them needs torch, importing this does not."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from ..errors import ConfigError
+from . import require_torch
+from .config import PRESETS, TrainingConfig
+
+_TRAIN_HELP = """\
+Train the networks on a data set, and keep the best epoch.
+
+DATASET is a folder with train.csv, test.csv, maps/ and tasks/. After each epoch the output folder
+holds last.pt (to go on from with --resume), best.pt (to export) and log.jsonl (the scores).
+
+  cbagan-ompl train DATASET --output runs/first
+  cbagan-ompl export runs/first/best.pt --output models/first.pt
+  cbagan-ompl plan MAP --model models/first.pt
+"""
+
+_EXPORT_HELP = """\
+Turn a training checkpoint into a model file that `plan --model` takes.
+
+Beside the model go a model card (.md) and its SHA-256 in manifest.json. Scores on the test tasks
+are in the card once the training run has come to its end.
+"""
+
+
+def add_train_parser(subparsers: Any) -> None:
+    """Add the command ``train``; its ``run`` default takes the parsed arguments."""
+    parser = subparsers.add_parser(
+        "train",
+        help="train the networks on a data set",
+        description=_TRAIN_HELP,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.set_defaults(run=_train)
+    parser.add_argument("dataset", metavar="DATASET", help="folder that holds train.csv")
+    parser.add_argument("--output", required=True, metavar="DIR", help="folder for the run's files")
+    parser.add_argument(
+        "--resume", action="store_true", help="go on from last.pt in the output folder"
+    )
+    recipe = parser.add_argument_group("recipe, the later overrides the earlier")
+    recipe.add_argument(
+        "--preset",
+        choices=sorted(PRESETS),
+        default="default",
+        help="default: what the bundled model was trained with; paper: the paper's table",
+    )
+    recipe.add_argument("--config", metavar="FILE", help="JSON or YAML file with options")
+    recipe.add_argument(
+        "--set",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="KEY=VALUE",
+        help=f"single options; known are {', '.join(TrainingConfig().to_dict())}",
+    )
+    recipe.add_argument("--epochs", type=int, metavar="N", help="the same as --set epochs=N")
+    machine = parser.add_argument_group("machine")
+    machine.add_argument(
+        "--device", default="auto", help="cpu, cuda, ... (default: a GPU if there is one)"
+    )
+    machine.add_argument("--threads", type=int, metavar="N", help="CPU threads (default: all)")
+    parser.add_argument("--json", metavar="FILE", help="write the scores as JSON")
+
+
+def add_export_parser(subparsers: Any) -> None:
+    """Add the command ``export``; its ``run`` default takes the parsed arguments."""
+    parser = subparsers.add_parser(
+        "export",
+        help="turn a training checkpoint into a model file",
+        description=_EXPORT_HELP,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.set_defaults(run=_export)
+    parser.add_argument("checkpoint", metavar="CHECKPOINT", help="best.pt of a training run")
+    parser.add_argument("--output", required=True, metavar="FILE", help="the model file, .pt")
+    parser.add_argument(
+        "--note", default="", metavar="TEXT", help="for the card: origin and licence of the data"
+    )
+    parser.add_argument("--json", metavar="FILE", help="write the model's record as JSON")
+
+
+def recipe_of(args: argparse.Namespace) -> TrainingConfig:
+    """The recipe that the arguments of ``train`` ask for.
+
+    Raises:
+        ConfigError: an unknown option, or a value that makes no sense.
+    """
+    config = TrainingConfig.preset(args.preset)
+    if args.config is not None:
+        config = TrainingConfig.from_file(args.config, config)
+    values: dict[str, Any] = {}
+    for assignment in args.set:
+        name, equals, text = assignment.partition("=")
+        if not equals:
+            raise ConfigError(f"--set takes KEY=VALUE, got {assignment!r}")
+        try:
+            values[name] = yaml.safe_load(text)
+        except yaml.YAMLError as error:
+            raise ConfigError(f"--set {assignment}: cannot read the value ({error})") from error
+    if args.epochs is not None:
+        values["epochs"] = args.epochs
+    return config.updated(values)
+
+
+def _train(args: argparse.Namespace) -> int:
+    config = recipe_of(args)
+    if args.threads is not None and args.threads < 1:
+        raise ConfigError(f"--threads must be at least 1, got {args.threads}")
+    require_torch()
+    import torch
+
+    from .dataset import load_dataset
+    from .training import train
+
+    if args.threads is not None:
+        torch.set_num_threads(args.threads)
+    dataset = load_dataset(args.dataset)
+    print(f"{len(dataset.train)} tasks for training, {len(dataset.test)} for testing")
+    try:
+        result = train(dataset, config, args.output, resume=args.resume, device=args.device)
+    except KeyboardInterrupt:
+        print("interrupted; go on with the same command and --resume", file=sys.stderr)
+        return 130
+    rows = {"best epoch": result["test"], **result["trivial"]}
+    print(f"\nscores of the region on the test tasks (best epoch: {result['epoch']})")
+    for name, scores in rows.items():
+        print(
+            f"  {name:15} IoU {scores['iou']:.3f}  Dice {scores['dice']:.3f}  "
+            f"connectivity {scores['connectivity']:.1%}"
+        )
+    print(f"export it with: cbagan-ompl export {result['checkpoint']} --output MODEL.pt")
+    _write_json(args.json, result)
+    return 0
+
+
+def _export(args: argparse.Namespace) -> int:
+    require_torch()
+    from .export import export
+
+    record = export(args.checkpoint, args.output, note=args.note)
+    print(
+        f"{args.output}: {record['parameters']:,} parameters, epoch {record['epoch']}, "
+        f"validation IoU {record['metrics']['validation']['iou']:.3f}"
+    )
+    if record["metrics"]["test"] is None:
+        print("the training run has not come to its end: the card has validation scores only")
+    _write_json(args.json, record)
+    return 0
+
+
+def _write_json(path: str | None, content: dict[str, Any]) -> None:
+    if path is None:
+        return
+    try:
+        Path(path).write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"cannot write {path}: {error.strerror or error}") from error

@@ -1,0 +1,58 @@
+"""Scores of a generator on tasks, next to predictors that know nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import cv2
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import nn
+
+from .dataset import Tasks, make_batch
+from .encoding import region_probability
+from .metrics import region_scores
+from .networks import encode
+
+#: A predicted probability from here on counts as region.
+THRESHOLD = 0.5
+
+#: Half the width in pixels of the straight line that predictions are compared with.
+LINE_HALF_WIDTH = 3
+
+
+def evaluate(
+    generator: nn.Module, tasks: Tasks, device: torch.device, batch_size: int
+) -> dict[str, float]:
+    """Scores of a generator's regions, see :func:`cbagan_ompl.network.metrics.region_scores`."""
+    predicted = np.concatenate(list(_predict(generator, tasks, device, batch_size)))
+    return region_scores(predicted, tasks.region.astype(bool), tasks.free, tasks.start, tasks.goal)
+
+
+@torch.inference_mode()
+def _predict(
+    generator: nn.Module, tasks: Tasks, device: torch.device, batch_size: int
+) -> Iterator[NDArray[np.bool_]]:
+    generator.eval()
+    for first in range(0, len(tasks), batch_size):
+        indices = np.arange(first, min(first + batch_size, len(tasks)))
+        batch = make_batch(tasks, indices, device)
+        images = encode(batch)
+        image = generator(images.map, images.points, torch.zeros_like(batch.free))
+        yield (region_probability(image)[:, 0] >= THRESHOLD).cpu().numpy()
+
+
+def trivial_scores(tasks: Tasks) -> dict[str, dict[str, float]]:
+    """Scores of two predictors that know nothing: all free space, and a straight band."""
+    truth, free = tasks.region.astype(bool), tasks.free
+    bands = np.zeros_like(tasks.region)
+    for band, start, goal in zip(bands, tasks.start, tasks.goal, strict=True):
+        ends = np.floor((start, goal)).astype(int).tolist()
+        cv2.line(band, ends[0], ends[1], 1, thickness=2 * LINE_HALF_WIDTH + 1)
+    return {
+        "all free space": region_scores(free, truth, free, tasks.start, tasks.goal),
+        "straight line": region_scores(
+            bands.astype(bool) & free, truth, free, tasks.start, tasks.goal
+        ),
+    }

@@ -1,0 +1,206 @@
+"""From a training checkpoint to one file that runs without this package's network code."""
+
+from __future__ import annotations
+
+import datetime
+import json
+import warnings
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from ..errors import ModelError
+from .checkpoints import best_generator, load_checkpoint
+from .encoding import map_image, point_image, region_probability
+from .generator import STRIDE, Generator
+from .model_files import MANIFEST, RECORD_NAME, RECORD_SCHEMA, read_manifest, sha256
+
+INPUTS = (
+    "free: float (B, 1, H, W) in [0, 1], 1 where free, any H and W; "
+    "start, goal: float (B, 2), pixel coordinates (u, v), u right and v down from the upper left "
+    "corner, the centre of the upper left pixel is (0.5, 0.5)"
+)
+OUTPUTS = "float (B, 1, H, W) in [0, 1]: probability that a pixel belongs to the promising region"
+
+
+class RegionModel(nn.Module):
+    """What the exported file holds: encoding, generator and decoding in one module.
+
+    Args:
+        generator: with its trained weights.
+    """
+
+    def __init__(self, generator: Generator) -> None:
+        super().__init__()
+        self.generator = generator
+        self.stride = STRIDE
+
+    def forward(self, free: Tensor, start: Tensor, goal: Tensor) -> Tensor:
+        """Probability of the region, (B, 1, H, W) in [0, 1], for any height and width.
+
+        The noise is 0, the centre of what training drew, so that equal inputs give equal outputs.
+
+        Args:
+            free: (B, 1, H, W) in [0, 1], 1 where free.
+            start: (B, 2), pixel coordinates (u, v).
+            goal: (B, 2), the same.
+        """
+        height, width = free.size(2), free.size(3)
+        # Blocked pixels to the right and below fill up to the strides and are cut off again.
+        padded = functional.pad(free, [0, -width % self.stride, 0, -height % self.stride])
+        points = point_image(start, goal, padded.size(2), padded.size(3))
+        image = self.generator(map_image(padded), points, torch.zeros_like(padded))
+        return region_probability(image)[:, :, :height, :width].clamp(0.0, 1.0)
+
+
+def export(
+    checkpoint: str | PathLike[str], path: str | PathLike[str], *, note: str = ""
+) -> dict[str, Any]:
+    """Write the generator of a checkpoint as a TorchScript file with its record.
+
+    Beside the file go a model card (the same name with suffix ``.md``) and its line in
+    ``manifest.json``, which names the default model and the SHA-256 of each.
+
+    Args:
+        checkpoint: a file that :func:`cbagan_ompl.network.training.train` wrote.
+        path: the file to write; its suffix is ``.pt``.
+        note: what the checkpoint cannot know, for the record and the card: where the data come
+            from, under which licence data and model are.
+
+    Returns:
+        The record, as the file carries it.
+
+    Raises:
+        ModelError: the checkpoint cannot be read, the file cannot be written, or has another
+            suffix.
+    """
+    target = Path(path)
+    if target.suffix != ".pt":
+        raise ModelError(f"{target}: the name of an exported model ends in .pt")
+    state = load_checkpoint(checkpoint)
+    model = RegionModel(best_generator(state)).eval()
+    record = make_record(target.stem, state, model, note)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.touch()
+    except OSError as error:
+        raise ModelError(f"cannot write {target}: {error.strerror or error}") from error
+    save_script(model, target, record)
+    target.with_suffix(".md").write_text(model_card(record), encoding="utf-8")
+    _update_manifest(target)
+    return record
+
+
+def save_script(model: nn.Module, path: Path, record: dict[str, Any]) -> None:
+    """Compile, freeze and save a module in evaluation mode, with its record inside."""
+    with warnings.catch_warnings():
+        # TorchScript is deprecated in favour of torch.export, but it is the form that this
+        # package's models have, and torch goes on reading and writing it.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        # No optimize_for_inference: what it writes cannot be loaded again.
+        frozen = torch.jit.freeze(torch.jit.script(model))
+        extra = {RECORD_NAME: json.dumps(record, indent=1)}
+        torch.jit.save(frozen, str(path), _extra_files=extra)
+
+
+def make_record(
+    name: str, state: dict[str, Any], model: nn.Module, note: str = ""
+) -> dict[str, Any]:
+    """What a model file says about itself.
+
+    Args:
+        name: of the model.
+        state: the training checkpoint.
+        model: the module, to count its parameters.
+        note: see :func:`export`.
+    """
+    last = state["history"][-1]
+    return {
+        "schema": RECORD_SCHEMA,
+        "name": name,
+        "inputs": INPUTS,
+        "outputs": OUTPUTS,
+        "working_size": state["dataset"]["side"],
+        "parameters": sum(parameter.numel() for parameter in model.parameters()),
+        "recipe": state["config"],
+        "epoch": last["epoch"],
+        "dataset": state["dataset"],
+        "note": note,
+        # The test scores are there once the run has come to its end.
+        "metrics": {
+            "validation": last["validation"],
+            "test": state.get("test"),
+            "trivial": state.get("trivial"),
+        },
+        "torch": str(torch.__version__),
+        "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
+    }
+
+
+def model_card(record: dict[str, Any]) -> str:
+    """The record as Markdown, for people."""
+    dataset, metrics = record["dataset"], record["metrics"]
+    split = "test" if metrics["test"] else "validation"
+    rows = {
+        "this model": metrics[split],
+        **((metrics["trivial"] if split == "test" else None) or {}),
+    }
+    columns = ("iou", "dice", "precision", "recall", "connectivity")
+    table = "\n".join(
+        f"| {name} | " + " | ".join(f"{scores[column]:.3f}" for column in columns) + " |"
+        for name, scores in rows.items()
+    )
+    recipe = "\n".join(f"- `{name}`: {value}" for name, value in record["recipe"].items())
+    return f"""# {record["name"]}
+
+Predicts, for a 2-D occupancy map with a start and a goal, the region that good paths probably run
+through. The generator of a convolutional block attention GAN (CBAGAN-RRT), exported as
+TorchScript on {record["date"]} with torch {record["torch"]}.
+
+- Input: {record["inputs"]}
+- Output: {record["outputs"]}
+- Parameters: {record["parameters"]:,}
+- Larger maps are scaled down to {record["working_size"]} pixels on the longer side, the size of
+  the training images.
+
+## Data
+
+`{dataset["name"]}`: {dataset["maps"]} maps of {dataset["side"]} x {dataset["side"]} pixels,
+{dataset["train_tasks"]} tasks for training and validation, {dataset["test_tasks"]} for testing.
+
+{record["note"] or "Licence and origin of the data: not stated."}
+
+## Scores
+
+Of the region class alone, over all pixels of the {split} tasks; connectivity is the share of tasks
+whose start and goal one 8-connected part of the region in free space joins.
+
+| predictor | {" | ".join(columns)} |
+|---|{"---|" * len(columns)}
+{table}
+
+## Limits
+
+The scores hold for maps like those of the training set. On other maps the region is a guess that
+may miss the way, so samplers keep a share of uniform draws, and a planner's guarantees rest on
+that share. The region says nothing of a robot's shape or dynamics.
+
+## Recipe
+
+Epoch {record["epoch"]} of:
+
+{recipe}
+"""
+
+
+def _update_manifest(model: Path) -> None:
+    path = model.parent / MANIFEST
+    manifest: dict[str, Any] = {"default": model.name, "files": {}}
+    if path.exists():
+        manifest = read_manifest(path)
+    manifest["files"][model.name] = {"sha256": sha256(model)}
+    path.write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")

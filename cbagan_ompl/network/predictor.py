@@ -1,0 +1,144 @@
+"""Prediction: an exported model, applied to maps of any size."""
+
+from __future__ import annotations
+
+import warnings
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import ModelError
+from ..gridmap import GridMap
+from ..heatmap import Heatmap
+from . import require_torch
+from .model_files import bundled_model, read_record
+
+if TYPE_CHECKING:
+    import torch
+
+# Free space keeps at least this value, so that a heat map can be drawn from even where the network
+# is certain that there is nothing.
+_FLOOR = 1e-4
+
+
+def load_model(path: str | PathLike[str] | None = None) -> Predictor:
+    """Load an exported model.
+
+    TorchScript files can carry code, so load only files from a source that you trust.
+
+    Args:
+        path: a file that ``cbagan-ompl export`` wrote; the bundled model by default.
+
+    Raises:
+        MissingDependencyError: torch is not installed.
+        ModelError: the file is missing, no exported model, damaged, or of a newer version.
+    """
+    require_torch()
+    import torch
+
+    source = bundled_model() if path is None else Path(path)
+    record = read_record(source)
+    try:
+        with warnings.catch_warnings():
+            # See export.save_script.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            module = torch.jit.load(str(source), map_location="cpu")  # type: ignore[no-untyped-call]
+    except Exception as error:  # torch raises many types for damaged archives
+        raise ModelError(
+            f"{source}: torch cannot load the model ({type(error).__name__}), the file is "
+            "probably damaged; copy or export it again"
+        ) from error
+    return Predictor(module, record)
+
+
+class Predictor:
+    """An exported model, ready to predict.
+
+    Attributes:
+        record: what the model file says about itself: ``working_size``, ``metrics``, ``recipe``...
+        inference_threads: CPU threads for one prediction. More than one rarely pays at the
+            working size, and costs ten times as long where other work has the cores.
+
+    Args:
+        module: maps (free, start, goal) to a region probability, see
+            :class:`cbagan_ompl.network.export.RegionModel`.
+        record: the record of its file.
+    """
+
+    def __init__(self, module: torch.nn.Module, record: dict[str, Any]) -> None:
+        self._module = module
+        self.record = record
+        self.inference_threads = 1
+
+    def predict(
+        self, grid: GridMap, start: ArrayLike, goal: ArrayLike, repair: bool = True
+    ) -> Heatmap:
+        """Predict where good paths run.
+
+        Args:
+            grid: the map, of any size. A map longer than the model's ``working_size`` is scaled
+                down for the network, and the result up again.
+            start: (x, y), world.
+            goal: (x, y), world.
+            repair: join the parts of the region where it falls apart between start and goal, see
+                :meth:`Heatmap.joined`; without it the heat map is as the network left it.
+
+        Raises:
+            TaskError: see :meth:`GridMap.check_task`.
+        """
+        ends = grid.to_pixel(grid.check_task(start, goal))
+        shape = scaled_shape(grid.shape, int(self.record["working_size"]))
+        scaled_ends = ends * (shape[1] / grid.width, shape[0] / grid.height)
+        values = self._run(scaled_free(grid.free, shape), scaled_ends)
+        full = cv2.resize(values, grid.shape[::-1], interpolation=cv2.INTER_LINEAR)
+        heatmap = Heatmap(np.clip(full, _FLOOR, 1), grid)
+        return heatmap.joined(start, goal) if repair else heatmap
+
+    def _run(self, free: NDArray[np.bool_], ends: NDArray[np.float64]) -> NDArray[np.float32]:
+        """The region probability, (H, W), of a map at working size with its start and goal."""
+        import torch
+        from torch.jit import optimized_execution  # type: ignore[attr-defined]
+
+        cells = torch.from_numpy(free.astype(np.float32))[None, None]
+        points = torch.from_numpy(ends.astype(np.float32))
+        threads = torch.get_num_threads()
+        torch.set_num_threads(self.inference_threads)
+        try:
+            # Without the optimiser, whose first two calls take ten times as long: a plan makes one.
+            with torch.inference_mode(), optimized_execution(False):
+                values = self._module(cells, points[:1], points[1:])
+        finally:
+            torch.set_num_threads(threads)
+        result: NDArray[np.float32] = values[0, 0].numpy()
+        return result
+
+    def __repr__(self) -> str:
+        return (
+            f"Predictor({self.record.get('name')!r}, "
+            f"working size {self.record['working_size']} pixels)"
+        )
+
+
+def scaled_shape(shape: tuple[int, int], longest: int) -> tuple[int, int]:
+    """Rows and columns of a map whose longer side is scaled down to ``longest`` pixels at most."""
+    factor = min(1.0, longest / max(shape))
+    return max(1, round(factor * shape[0])), max(1, round(factor * shape[1]))
+
+
+def scaled_free(free: NDArray[np.bool_], shape: tuple[int, int]) -> NDArray[np.bool_]:
+    """A free mask scaled down so that a pixel stays free when any pixel of its block is.
+
+    Narrow passages survive, thin walls may not. That is the lesser harm: what the network then
+    draws across a wall is cut out by the obstacles of the full map, whereas a passage that it
+    cannot see it never draws.
+
+    Args:
+        free: (H, W).
+        shape: (h, w), at most (H, W).
+    """
+    rows, columns = (np.arange(n) * size // n for n, size in zip(shape, free.shape, strict=True))
+    return np.logical_or.reduceat(np.logical_or.reduceat(free, rows, axis=0), columns, axis=1)
