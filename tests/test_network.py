@@ -92,13 +92,13 @@ def test_map_image_is_white_where_free() -> None:
     assert map_image(free)[0, :, 0].T.tolist() == [[1, 1, 1], [-1, -1, -1]]
 
 
-def test_point_image_has_a_red_start_and_a_blue_goal() -> None:
+def test_point_image_has_a_blue_start_and_a_red_goal() -> None:
     image = point_image(torch.tensor([[3.5, 2.5]]), torch.tensor([[9.5, 5.5]]), 8, 13)[0]
     assert image.shape == (3, 8, 13)
-    assert image[:, 2, 3].tolist() == [1, -1, -1]
-    assert image[:, 5, 9].tolist() == [-1, -1, 1]
+    assert image[:, 2, 3].tolist() == [-1, -1, 1]
+    assert image[:, 5, 9].tolist() == [1, -1, -1]
     assert image[:, 0, 12].tolist() == [1, 1, 1]
-    assert (image[2, :, :7] < 0).sum() == 9
+    assert (image[0, :, :7] < 0).sum() == 9
 
 
 def test_spots_move_with_the_fraction_of_a_pixel() -> None:
@@ -132,6 +132,6 @@ def test_encoding_matches_a_slow_reference() -> None:
     image = point_image(torch.tensor([start]), torch.tensor([goal]), 12, 16)[0].numpy()
     for row, column in np.ndindex(12, 16):
         distance = np.hypot(column + 0.5 - start[0], row + 0.5 - start[1])
-        assert image[2, row, column] == pytest.approx(
+        assert image[0, row, column] == pytest.approx(
             1 - 2 * np.clip(2.5 - distance, 0, 1), abs=1e-5
         )

@@ -24,8 +24,8 @@ def write_training_set(folder: Path, maps: int = 2, tasks: int = 10) -> Path:
         for n in range(tasks):
             row, column = rng.integers(1, 9), rng.integers(24, 31)
             points = np.full((SIDE, SIDE, 3), 255, np.uint8)
-            points[row, 2] = (0, 0, 255)
-            points[28, column] = (255, 0, 0)
+            points[row, 2] = (255, 0, 0)
+            points[28, column] = (0, 0, 255)
             region = np.full((SIDE, SIDE, 3), 255, np.uint8)
             region[row : row + 2, 2 : column + 1] = (0, 255, 0)
             region[row:29, column : column + 2] = (0, 255, 0)

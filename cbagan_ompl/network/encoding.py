@@ -4,7 +4,7 @@ The one place that knows the colours: training and the exported model both call 
 which is why they are TorchScript. Images are (B, 3, H, W), red, green, blue, in [-1, 1]:
 
 * map image: white where free, black where blocked;
-* point image: a red spot at the start and a blue one at the goal, on white;
+* point image: a blue spot at the start and a red one at the goal, on white;
 * region image: green where the region is, on white.
 """
 
@@ -41,8 +41,8 @@ def point_image(start: Tensor, goal: Tensor, height: int, width: int) -> Tensor:
     Returns:
         (B, 3, H, W) in [-1, 1].
     """
-    red = spot(start, height, width)
-    blue = spot(goal, height, width)
+    blue = spot(start, height, width)
+    red = spot(goal, height, width)
     # Both spots leave green dark; red leaves blue dark and the other way about.
     return 1 - 2 * torch.cat((blue, torch.maximum(red, blue), red), 1)
 
