@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
@@ -11,9 +12,15 @@ from scipy.sparse.csgraph import dijkstra
 
 from .segments import segment_is_free
 
-#: Row and column offset of half of the eight neighbours; the graph is undirected.
+# Row and column offset of half of the eight neighbours; the graph is undirected.
 _STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))
 _NO_PREDECESSOR = -9999
+
+# Longest side of a grid that is searched as a whole. A larger one is searched in a band around
+# the path through a coarse grid, this many coarse pixels to each side of it.
+_WHOLE_SIDE = 512
+_COARSE_SIDE = 256
+_BAND = 3
 
 
 def shortest_path(
@@ -24,7 +31,9 @@ def shortest_path(
 ) -> NDArray[np.intp] | None:
     """Cheapest 8-connected path between two pixels.
 
-    A diagonal step needs both pixels beside it free, so that the path is a valid motion.
+    A diagonal step needs both pixels beside it free, so that the path is a valid motion. Grids
+    with a side above 512 pixels are searched around the path through a coarse grid first, so that
+    their path may be a little dearer than the cheapest.
 
     Args:
         free: shape (H, W).
@@ -36,23 +45,66 @@ def shortest_path(
     Returns:
         Pixels (column, row), shape (K, 2), both ends included; None where nothing joins them.
     """
-    width = free.shape[1]
-    source, target = start[1] * width + start[0], goal[1] * width + goal[0]
-    graph = _grid_graph(free, np.ones(free.shape, np.float32) if cost is None else cost)
+    price = np.ones(free.shape, np.float32) if cost is None else cost
+    if max(free.shape) > _WHOLE_SIDE:
+        band = _coarse_band(free, start, goal, price)
+        path = None if band is None else _search(free & band, start, goal, price)
+        if path is not None:
+            return path
+    return _search(free, start, goal, price)
+
+
+def _coarse_band(
+    free: NDArray[np.bool_],
+    start: tuple[int, int],
+    goal: tuple[int, int],
+    price: NDArray[np.float32],
+) -> NDArray[np.bool_] | None:
+    """Pixels near the cheapest path through blocks of pixels, free where any of their pixels is."""
+    size = -(-max(free.shape) // _COARSE_SIDE)
+    padding = [(0, -side % size) for side in free.shape]
+    blocks = np.pad(free, padding)
+    shape = blocks.shape[0] // size, size, blocks.shape[1] // size, size
+    coarse = np.asarray(blocks.reshape(shape).any(axis=(1, 3)))
+    coarse_price = np.pad(price, padding, mode="edge").reshape(shape).mean(axis=(1, 3))
+    source, target = ((u // size, v // size) for u, v in (start, goal))
+    path = _search(coarse, source, target, coarse_price)
+    if path is None:
+        return None
+    visited = np.zeros(coarse.shape, np.uint8)
+    visited[path[:, 1], path[:, 0]] = 1
+    band = cv2.dilate(visited, np.ones((2 * _BAND + 1, 2 * _BAND + 1), np.uint8))
+    fine = band.repeat(size, axis=0).repeat(size, axis=1)[: free.shape[0], : free.shape[1]]
+    return fine.astype(bool)
+
+
+def _search(
+    free: NDArray[np.bool_],
+    start: tuple[int, int],
+    goal: tuple[int, int],
+    price: NDArray[np.float32],
+) -> NDArray[np.intp] | None:
+    """Dijkstra's search over the free pixels."""
+    node = np.full(free.shape, -1, np.int32)
+    pixels = np.flatnonzero(free)
+    node.ravel()[pixels] = np.arange(len(pixels))
+    source, target = (int(node[v, u]) for u, v in (start, goal))
+    graph = _grid_graph(free, price, node, len(pixels))
     _, predecessors = dijkstra(graph, directed=False, indices=source, return_predecessors=True)
-    pixels = [target]
-    while pixels[-1] != source:
-        before = int(predecessors[pixels[-1]])
+    nodes = [target]
+    while nodes[-1] != source:
+        before = int(predecessors[nodes[-1]])
         if before == _NO_PREDECESSOR:
             return None
-        pixels.append(before)
-    indices = np.array(pixels[::-1], dtype=np.intp)
-    return np.stack((indices % width, indices // width), axis=-1)
+        nodes.append(before)
+    rows, columns = np.divmod(pixels[nodes[::-1]], free.shape[1])
+    return np.stack((columns, rows), axis=-1)
 
 
-def _grid_graph(free: NDArray[np.bool_], cost: NDArray[np.float32]) -> csr_array:
+def _grid_graph(
+    free: NDArray[np.bool_], price: NDArray[np.float32], node: NDArray[np.int32], count: int
+) -> csr_array:
     height, width = free.shape
-    index = np.arange(free.size, dtype=np.int32).reshape(free.shape)
     tails, heads, weights = [], [], []
     for down, right in _STEPS:
         here = (slice(0, height - down), slice(max(0, -right), width - max(0, right)))
@@ -60,12 +112,12 @@ def _grid_graph(free: NDArray[np.bool_], cost: NDArray[np.float32]) -> csr_array
         passable = free[here] & free[there]
         if down and right:
             passable &= free[here[0], there[1]] & free[there[0], here[1]]
-        tails.append(index[here][passable])
-        heads.append(index[there][passable])
-        weights.append(np.hypot(down, right) * 0.5 * (cost[here] + cost[there])[passable])
+        tails.append(node[here][passable])
+        heads.append(node[there][passable])
+        weights.append(np.hypot(down, right) * 0.5 * (price[here] + price[there])[passable])
     return csr_array(
         (np.concatenate(weights), (np.concatenate(tails), np.concatenate(heads))),
-        shape=(free.size, free.size),
+        shape=(count, count),
     )
 
 

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cbagan_ompl import grid_search
 from cbagan_ompl.grid_search import pull_taut, shortest_path
 from cbagan_ompl.gridmap import GridMap
 
@@ -37,6 +38,29 @@ def test_price_moves_the_path() -> None:
     path = shortest_path(np.ones((11, 11), bool), (0, 5), (10, 5), price)
     assert path is not None
     assert path[:, 1].max() >= 8
+
+
+def test_large_grids_are_searched_in_a_band() -> None:
+    free = np.ones((700, 900), bool)
+    free[300:320, :800] = False
+    free[500, 100:] = False
+    whole = grid_search._search(free, (5, 5), (890, 690), np.ones(free.shape, np.float32))
+    path = shortest_path(free, (5, 5), (890, 690))
+    assert path is not None
+    assert whole is not None
+    assert GridMap(free).path_is_free(path + 0.5)
+    assert length(path) < 1.02 * length(whole)
+
+
+def test_large_grids_with_thin_walls_are_searched_as_a_whole() -> None:
+    """The coarse grid sees no wall of one pixel; the way around leaves the band."""
+    free = np.ones((600, 600), bool)
+    free[300, :590] = False
+    path = shortest_path(free, (5, 5), (5, 590))
+    assert path is not None
+    assert GridMap(free).path_is_free(path + 0.5)
+    free[300] = False
+    assert shortest_path(free, (5, 5), (5, 590)) is None
 
 
 def test_pulled_taut_path_is_free_and_shorter() -> None:
