@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -36,7 +37,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: what follows the program's name; ``sys.argv[1:]`` by default.
 
     Returns:
-        The exit status: 0 done, 1 no path found, 2 bad input, 130 interrupted.
+        The exit status: 0 done, 1 no path found, 2 bad input, 130 interrupted, 141 nobody reads
+        the output.
     """
     parser = _parser()
     args = parser.parse_args(arguments)
@@ -48,6 +50,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return 130
+    except BrokenPipeError:
+        # The reader of our output has gone, as in "| head -1": files are written by then.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -181,12 +187,11 @@ def _plan(args: argparse.Namespace) -> int:
         keep_tree=args.output is not None,
     )
     values = result.to_dict()
-    _print_summary(values)
     if args.json is not None:
         _write_json(args.json, values)
     if args.output is not None:
         save_picture(result, grid, args.output)
-        print(f"picture        {args.output}")
+    _print_summary(values, args.output)
     return 0 if result.solved else 1
 
 
@@ -209,7 +214,7 @@ def _ends(
     return tasks[number].start, tasks[number].goal
 
 
-def _print_summary(values: dict[str, Any]) -> None:
+def _print_summary(values: dict[str, Any], picture: str | None) -> None:
     solved = f"yes, cost {values['cost']:.6g}" if values["solved"] else f"no ({values['status']})"
     first = values["first_solution_s"]
     rows = {
@@ -222,6 +227,7 @@ def _print_summary(values: dict[str, Any]) -> None:
         "planning": f"{values['planning_s']:.4f} s"
         + ("" if first is None else f", first solution after {first:.4f} s"),
         "seed": values["seed"],
+        **({"picture": picture} if picture else {}),
     }
     for name, value in rows.items():
         print(f"{name:<14} {value}")
@@ -232,3 +238,7 @@ def _write_json(path: str, values: dict[str, Any]) -> None:
         Path(path).write_text(json.dumps(values, indent=2) + "\n", encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"cannot write {path}: {error.strerror or error}") from error
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,6 +1,9 @@
 from __future__ import annotations
 
 import json
+import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 import cv2
@@ -118,3 +121,13 @@ def test_help(command: str, capsys: pytest.CaptureFixture[str]) -> None:
         main([command, "--help"])
     assert exit_.value.code == 0
     assert len(capsys.readouterr().out) > 500
+
+
+def test_reader_that_goes_away() -> None:
+    command = [sys.executable, "-m", "cbagan_ompl.cli", *QUICK]
+    pipeline = f"{shlex.join(command)} | true; exit ${{PIPESTATUS[0]}}"
+    done = subprocess.run(
+        ["bash", "-c", pipeline], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode in (0, 141)
+    assert done.stderr == ""
