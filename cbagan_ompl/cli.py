@@ -41,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         the output.
     """
     parser = _parser()
-    args = parser.parse_args(arguments)
+    args = parser.parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
     try:
         return int(args.run(args))
     except CbaganOmplError as error:
@@ -54,6 +54,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # The reader of our output has gone, as in "| head -1": files are written by then.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
+
+
+def _joined(arguments: Sequence[str]) -> list[str]:
+    """Points joined to their options: argparse takes what begins with "-" for an option."""
+    joined: list[str] = []
+    for argument in arguments:
+        if joined and joined[-1] in ("--start", "--goal"):
+            joined[-1] += f"={argument}"
+        else:
+            joined.append(argument)
+    return joined
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -149,8 +160,7 @@ def _point(text: str) -> tuple[float, float]:
         x, y = (float(part) for part in text.split(","))
     except ValueError:
         raise argparse.ArgumentTypeError(
-            f"expected two numbers as X,Y, such as 12.5,40; got {text!r} (write a negative one as "
-            "--start=-1,2)"
+            f"expected two numbers as X,Y, such as 12.5,-40; got {text!r}"
         ) from None
     return x, y
 
@@ -215,7 +225,7 @@ def _ends(
 
 
 def _print_summary(values: dict[str, Any], picture: str | None) -> None:
-    solved = f"yes, cost {values['cost']:.6g}" if values["solved"] else f"no ({values['status']})"
+    solved = f"yes, cost {values['cost']:.6g}" if values["solved"] else f"no ({_why(values)})"
     first = values["first_solution_s"]
     rows = {
         "solved": solved,
@@ -231,6 +241,11 @@ def _print_summary(values: dict[str, Any], picture: str | None) -> None:
     }
     for name, value in rows.items():
         print(f"{name:<14} {value}")
+
+
+def _why(values: dict[str, Any]) -> str:
+    exact = values["status"] == "Exact solution"
+    return "its path failed the check" if exact else values["status"]
 
 
 def _write_json(path: str, values: dict[str, Any]) -> None:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import inf
+from math import inf, nan
+from typing import SupportsFloat
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import ConfigError
+from .errors import ConfigError, HeatmapError
 from .heatmap import Heatmap, draw_points
 
 #: Share of draws that stays uniform over free space unless the user asks otherwise.
@@ -19,6 +20,10 @@ DEFAULT_UNIFORM_FRACTION = 0.1
 _FIRST_BATCH, _LARGEST_BATCH = 64, 1024
 # Candidates of which a local draw picks one, with probability proportional to the heat map.
 _LOCAL_CANDIDATES = 32
+# Share of a batch inside the informed set under which the weights are made to follow the set: while
+# most draws fall inside, dropping the others is cheaper than weighing all pixels again.
+_MIN_ACCEPTED = 0.5
+
 # Batches without a single point inside the informed set before a draw from outside is let through.
 _MAX_EMPTY_BATCHES = 8
 
@@ -67,22 +72,20 @@ class DrawStream:
         uniform_fraction: float = DEFAULT_UNIFORM_FRACTION,
         seed: int | np.random.Generator | None = None,
     ) -> None:
-        if not 0 < uniform_fraction <= 1:
-            raise ConfigError(
-                f"uniform_fraction is a share above 0 and up to 1, got {uniform_fraction}; it "
-                "cannot be 0, because the planner would lose probabilistic completeness"
-            )
+        check_uniform_fraction(uniform_fraction)
         self.heatmap = heatmap
         self.uniform_fraction = float(uniform_fraction)
         self.learned = 0
         self.uniform = 0
         self.rng = np.random.default_rng(seed)
-        self._parts = (_Part(heatmap), _Part(Heatmap.uniform(heatmap.grid)))
+        self._parts = tuple(_Part(part) for part in (heatmap, Heatmap.uniform(heatmap.grid)))
         self._batch = _FIRST_BATCH
         self._pending: list[tuple[float, float, float, bool]] = []
         self._best_cost: Callable[[], float] = _no_cost
         self._informed_set: Callable[[], InformedSet] = _no_set
         self._informed: InformedSet | None = None
+        self._accepted = 1.0
+        self._box = np.full(2, -inf), np.full(2, inf)
 
     @property
     def draws(self) -> dict[str, int]:
@@ -92,6 +95,24 @@ class DrawStream:
     def reset_counts(self) -> None:
         """Start counting at 0 again."""
         self.learned = self.uniform = 0
+
+    def keep_inside(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> None:
+        """Draw only inside a box, such as the bounds of a state space.
+
+        Args:
+            low: lower bounds, (2,), world.
+            high: upper bounds, (2,), world.
+
+        Raises:
+            HeatmapError: the heat map is 0 everywhere inside.
+        """
+        if np.array_equal(self._box, (low, high)):
+            return
+        self._box = low, high
+        self._pending.clear()
+        map_low, map_high = self.heatmap.grid.bounds
+        if (low > map_low).any() or (high < map_high).any():
+            self._parts = tuple(_Part(part.heatmap, self._box) for part in self._parts)
 
     def follow(
         self, best_cost: Callable[[], float], informed_set: Callable[[], InformedSet]
@@ -116,23 +137,27 @@ class DrawStream:
                 if bound <= best:
                     return self._count(x, y, uniform)
             self._refill(best)
+        # Nothing of the map is in the informed set: any draw is as good as another.
         x, y, _, uniform = self._pending.pop()
         return self._count(x, y, uniform)
 
     def near(self, x: float, y: float, distance: float) -> tuple[float, float]:
         """A draw within ``distance`` of (x, y) along each axis (OMPL's box neighbourhood)."""
-        offsets = self.rng.uniform(-distance, distance, (_LOCAL_CANDIDATES, 2))
-        return self._pick(np.array((x, y)) + offsets)
+        low = np.maximum((x - distance, y - distance), self._box[0])
+        high = np.minimum((x + distance, y + distance), self._box[1])
+        return self._pick(self.rng.uniform(low, np.maximum(low, high), (_LOCAL_CANDIDATES, 2)))
 
     def gaussian(self, x: float, y: float, deviation: float) -> tuple[float, float]:
         """A draw around (x, y) with the given standard deviation along each axis."""
-        return self._pick(self.rng.normal((x, y), deviation, (_LOCAL_CANDIDATES, 2)))
+        candidates = self.rng.normal((x, y), deviation, (_LOCAL_CANDIDATES, 2))
+        return self._pick(np.clip(candidates, *self._box))
 
     def _inform(self, informed: InformedSet | None) -> None:
         self._informed = informed
+        self._accepted = 1.0
         self._pending.clear()
         for part in self._parts:
-            part.inform(informed)
+            part.restrict(None, inf)
 
     def _pick(self, candidates: NDArray[np.float64]) -> tuple[float, float]:
         """Resample one of the candidates by its heat, or the first one as the uniform draw."""
@@ -160,51 +185,89 @@ class DrawStream:
 
     def _refill(self, best: float) -> None:
         size, self._batch = self._batch, min(2 * self._batch, _LARGEST_BATCH)
+        if self._informed is not None and self._accepted < _MIN_ACCEPTED:
+            for part in self._parts:
+                part.restrict(self._informed, best)
         uniform = self.rng.random(size) < self.uniform_fraction
         points = np.empty((size, 2))
         for part, mask in zip(self._parts, (~uniform, uniform), strict=True):
-            points[mask] = part.draw(int(mask.sum()), best, self.rng)
-        if self._informed is None:
-            bounds = np.full(size, -inf)
-        else:
+            points[mask] = part.draw(int(mask.sum()), self.rng)
+        bounds = np.full(size, -inf)
+        if self._informed is not None:
             bounds = self._informed.shortest_through(points)
+            self._accepted = float((bounds <= best).mean())
+        bounds[~_inside(points, *self._box)] = nan  # no cost is above it: never handed out
         columns = points[:, 0], points[:, 1], bounds, uniform
         self._pending = list(zip(*(column.tolist() for column in columns), strict=True))
 
 
 class _Part:
-    """A heat map whose weights follow the informed set."""
+    """A heat map whose weights can be kept inside a box and made to follow the informed set."""
 
-    def __init__(self, heatmap: Heatmap) -> None:
+    def __init__(
+        self,
+        heatmap: Heatmap,
+        box: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
+    ) -> None:
+        self.heatmap = heatmap
         self._grid = heatmap.grid
-        self._support = self._active = heatmap.support
+        self._support = heatmap.support
+        if box is not None:
+            # Pixels that the box cuts keep their weight, the draws outside are dropped.
+            reach = self._grid.resolution * np.sqrt(0.5)
+            touching = _inside(self._centres(), box[0] - reach, box[1] + reach)
+            self._support = self._support[touching]
+            if not len(self._support):
+                raise HeatmapError(
+                    f"the heat map of {self._grid.name} is 0 everywhere in the space, which spans "
+                    f"x {box[0][0]:g} to {box[1][0]:g} and y {box[0][1]:g} to {box[1][1]:g}; the "
+                    "space must be in the coordinates of the map"
+                )
         self._weights = heatmap.values.ravel()[self._support].astype(np.float64)
-        self._cumulative = self._weights.cumsum()
         self._bounds: NDArray[np.float64] | None = None
-        self._best = inf
+        self.restrict(None, inf)
 
-    def inform(self, informed: InformedSet | None) -> None:
-        self._active, self._cumulative = self._support, self._weights.cumsum()
-        self._bounds, self._best = None, inf
+    def restrict(self, informed: InformedSet | None, best: float) -> None:
+        """Weigh only pixels with points in the informed set; where there are none, all of them."""
+        self._active, weights = self._support, self._weights
         if informed is None:
-            return
-        pixels = np.stack((self._support % self._grid.width, self._support // self._grid.width), -1)
-        centres = self._grid.to_world(pixels + 0.5)
-        # Twice the distance from a pixel's centre to its corner: the bound of no point inside
-        # the pixel is lower by more.
-        self._bounds = informed.shortest_through(centres) - np.sqrt(2) * self._grid.resolution
+            self._bounds = None
+        else:
+            if self._bounds is None:
+                # The bound of no point of a pixel is lower than its centre's by more: it changes
+                # at most twice as fast as the distance from the centre, half a diagonal.
+                slack = np.sqrt(2) * self._grid.resolution
+                self._bounds = informed.shortest_through(self._centres()) - slack
+            inside = np.asarray(self._bounds <= best)
+            if inside.any():
+                self._active, weights = self._support[inside], self._weights[inside]
+        self._cumulative = weights.cumsum()
 
-    def draw(self, n: int, best: float, rng: np.random.Generator) -> NDArray[np.float64]:
-        if self._bounds is not None and best != self._best:
-            self._restrict(self._bounds <= best)
-            self._best = best
+    def draw(self, n: int, rng: np.random.Generator) -> NDArray[np.float64]:
         return draw_points(self._grid, self._active, self._cumulative, n, rng)
 
-    def _restrict(self, inside: NDArray[np.bool_]) -> None:
-        """Keep only these pixels of the support; where that leaves none, keep the last ones."""
-        if inside.any():
-            self._active = self._support[inside]
-            self._cumulative = self._weights[inside].cumsum()
+    def _centres(self) -> NDArray[np.float64]:
+        rows, columns = np.divmod(self._support, self._grid.width)
+        return self._grid.to_world(np.stack((columns, rows), axis=-1) + 0.5)
+
+
+def check_uniform_fraction(uniform_fraction: float) -> None:
+    """Refuse a share that is no share, or that leaves nothing uniform.
+
+    Raises:
+        ConfigError: outside (0, 1].
+    """
+    if not (isinstance(uniform_fraction, SupportsFloat) and 0 < uniform_fraction <= 1):
+        raise ConfigError(
+            f"uniform_fraction is a share above 0 and up to 1, got {uniform_fraction!r}; it "
+            "cannot be 0, because the planner would lose probabilistic completeness"
+        )
+
+
+def _inside(
+    points: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    return np.asarray(((points >= low) & (points <= high)).all(axis=1))
 
 
 def _nearest(points: NDArray[np.float64], ends: NDArray[np.float64]) -> NDArray[np.float64]:

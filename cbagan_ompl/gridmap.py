@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from math import cos, isfinite, sin
 from os import PathLike
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, SupportsFloat
 
 import cv2
 import numpy as np
@@ -14,8 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import MapError, TaskError
 from .segments import segment_is_free
 
-#: Longest side of a map, in pixels. Larger files are refused before memory is spent on them.
+#: Longest side and largest area of a map, in pixels. Larger files are refused before memory is
+#: spent on them: a learned plan takes about 140 bytes a pixel.
 MAX_SIDE = 16384
+MAX_PIXELS = 2**26
 
 
 class Affine(NamedTuple):
@@ -82,13 +85,17 @@ class GridMap:
             raise MapError(f"{name}: a map holds booleans or numbers, not {cells.dtype}")
         if cells.dtype.kind == "f" and not np.isfinite(cells).all():
             raise MapError(f"{name}: the map holds NaN or infinite values")
-        if not isfinite(resolution) or resolution <= 0:
+        if not (_is_number(resolution) and resolution > 0 and isfinite(1 / resolution)):
             raise MapError(
                 f"{name}: resolution is the length of a pixel in world units and must be "
-                f"positive, got {resolution}"
+                f"positive, got {resolution!r}"
             )
-        if origin is not None and (len(origin) != 3 or not all(isfinite(o) for o in origin)):
-            raise MapError(f"{name}: origin is (x, y, yaw) with finite numbers, got {origin}")
+        if origin is not None and not (
+            isinstance(origin, Sequence | np.ndarray)
+            and len(origin) == 3
+            and all(map(_is_number, origin))
+        ):
+            raise MapError(f"{name}: origin is (x, y, yaw) with finite numbers, got {origin!r}")
         self.free: NDArray[np.bool_] = np.ascontiguousarray(cells != 0)
         if not self.free.any():
             raise MapError(f"{name}: every pixel is blocked, there is nowhere to plan")
@@ -209,8 +216,8 @@ class GridMap:
         Raises:
             MapError: radius negative or not finite, or nothing stays free.
         """
-        if not isfinite(radius) or radius < 0:
-            raise MapError(f"the robot radius must be a length of at least 0, got {radius}")
+        if not _is_number(radius) or radius < 0:
+            raise MapError(f"the robot radius must be a length of at least 0, got {radius!r}")
         if radius == 0 or self.free.all():
             return self
         # The gap between two pixels is the distance of their centres with one of them grown by a
@@ -225,7 +232,8 @@ class GridMap:
                 f"{self.name}: a robot of radius {radius} fits nowhere on this map "
                 f"({self.width} x {self.height} pixels of {self.resolution})"
             )
-        return GridMap(free, self.resolution, self.origin, name=self.name)
+        name = f"{self.name} (inflated by {radius:g})"
+        return GridMap(free, self.resolution, self.origin, name=name)
 
     @cached_property
     def components(self) -> NDArray[np.int32]:
@@ -288,16 +296,20 @@ class GridMap:
         )
 
 
+def _is_number(value: object) -> bool:
+    return isinstance(value, SupportsFloat) and isfinite(value)
+
+
 def check_side(width: int, height: int, name: str) -> None:
     """Refuse maps too large to plan on.
 
     Raises:
-        MapError: a side is longer than :data:`MAX_SIDE`.
+        MapError: more than :data:`MAX_SIDE` pixels a side or :data:`MAX_PIXELS` in all.
     """
-    if max(width, height) > MAX_SIDE:
+    if max(width, height) > MAX_SIDE or width * height > MAX_PIXELS:
         raise MapError(
-            f"{name}: {width} x {height} pixels; maps up to {MAX_SIDE} pixels a side are "
-            "supported, scale it down first"
+            f"{name}: {width} x {height} pixels; maps up to {MAX_SIDE} pixels a side and "
+            f"{MAX_PIXELS} pixels in all are supported, scale it down first"
         )
 
 

@@ -36,8 +36,8 @@ class Heatmap:
         grid: the map that the values lie on.
 
     Args:
-        values: any real array of the grid's shape. Booleans and unsigned integers are scaled
-            from their full range to [0, 1]; floating-point values must lie in it already.
+        values: any real array of the grid's shape. Unsigned integers are scaled from their full
+            range to [0, 1], but for masks of 0 and 1; other values must lie in it already.
         grid: the map.
 
     Raises:
@@ -223,7 +223,8 @@ def draw_points(
 def _to_unit_range(raw: NDArray[Any]) -> NDArray[np.float32]:
     """A fresh array of the values in [0, 1]."""
     if raw.dtype.kind in "bu":
-        full = 1 if raw.dtype.kind == "b" else np.iinfo(raw.dtype).max
+        is_mask = raw.dtype.kind == "b" or raw.max() <= 1
+        full = 1 if is_mask else np.iinfo(raw.dtype).max
         return raw.astype(np.float32) / np.float32(full)
     if raw.dtype.kind not in "if":
         raise HeatmapError(f"a heat map holds real numbers, not {raw.dtype}")

@@ -129,7 +129,9 @@ def _decode_pgm(data: bytes, name: str) -> Picture:
     Not by OpenCV, which scales some of the brightest levels other than 255 and some not.
     """
     gap = rb"(?:\s|#[^\n]*\n)+"
-    header = re.match(rb"P([25])" + gap + rb"(\d+)" + gap + rb"(\d+)" + gap + rb"(\d+)\s", data)
+    header = re.match(
+        rb"P([25])" + gap + rb"(\d{1,9})" + gap + rb"(\d{1,9})" + gap + rb"(\d{1,9})\s", data
+    )
     if header is None:
         raise MapError(
             f"{name}: the PGM header is incomplete, expected P5 or P2, width, height and the "

@@ -54,6 +54,19 @@ def test_start_and_goal_and_seed(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "three.json").read_text())["path"] == reports[0]["path"]
 
 
+def test_negative_coordinates(tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "hall.png"), np.full((40, 60), 254, np.uint8))
+    (tmp_path / "hall.yaml").write_text(
+        "image: hall.png\nresolution: 0.1\norigin: [-3, -2, 0]\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.25\n"
+    )
+    arguments = ["plan", str(tmp_path / "hall.yaml"), "--sampler", "corridor", "--planner", "RRT"]
+    report = tmp_path / "plan.json"
+    ends = ["--start", "-2.5,-1.5", "--goal", "-1,.5"]
+    assert main([*arguments, *ends, "--json", str(report)]) == 0
+    assert json.loads(report.read_text())["start"] == [-2.5, -1.5]
+
+
 def test_heatmap_file(tmp_path: Path) -> None:
     grid = GridMap.load(MAP)
     task = tasks_of(MAP, grid)[0]

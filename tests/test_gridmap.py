@@ -219,7 +219,7 @@ def test_inflated_keeps_the_pixels_that_are_radius_away_and_no_others(resolution
         assert (inflated.resolution, inflated.origin, inflated.name) == (
             grid.resolution,
             grid.origin,
-            "room",
+            f"room (inflated by {radius:g})",
         )
 
 

@@ -59,7 +59,8 @@ def test_integer_and_boolean_arrays_are_scaled() -> None:
     np.testing.assert_allclose(
         Heatmap(np.array([[0, 51, 255]], np.uint8), grid).values, [[0, 0.2, 1]]
     )
-    np.testing.assert_array_equal(Heatmap([[False, True, True]], grid).values, [[0, 1, 1]])
+    for mask in ([[False, True, True]], np.array([[0, 1, 1]], np.uint8), [[0, 1, 1]]):
+        np.testing.assert_array_equal(Heatmap(mask, grid).values, [[0, 1, 1]])
 
 
 @pytest.mark.parametrize(

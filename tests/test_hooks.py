@@ -237,7 +237,10 @@ def test_unreached_planners_say_what_would_reach_them(
     two_walls: GridMap, corridor: Heatmap
 ) -> None:
     with pytest.raises(PlannerError, match=r"no hook reaches BITstar.*Reached here: .*RRTstar"):
-        attach(make_setup(two_walls, "BITstar"), corridor)
+        hooks.hook_of("BITstar")
+    if "EITstar" in compat.planner_names():
+        with pytest.raises(PlannerError, match="no hook reaches EITstar"):
+            attach(make_setup(two_walls, "EITstar"), corridor)
     if not compat.HAS_STATE_SAMPLER_ALLOCATOR:
         with pytest.raises(PlannerError, match=r"setStateSamplerAllocator, such as ompl 1\.7\.0"):
             attach(make_setup(two_walls, "RRTConnect"), corridor)
@@ -305,3 +308,105 @@ def test_same_seed_same_poses(two_walls: GridMap, corridor: Heatmap, planner: st
             states = [path.getState(i) for i in range(path.getStateCount())]
             runs.append([(s.getX(), s.getY(), s.getYaw()) for s in states])
     assert runs[0] == runs[1]
+
+
+@pytest.mark.skipif(not compat.HAS_STATE_SAMPLER_ALLOCATOR, reason="not reached by this build")
+@pytest.mark.parametrize("planner", sorted(hooks.KEEP_SAMPLER))
+def test_planners_that_keep_their_sampler_are_reached_when_set_up(
+    two_walls: GridMap, corridor: Heatmap, planner: str
+) -> None:
+    setup = make_setup(two_walls, planner)
+    setup.setup()
+    with attach(setup, corridor, seed=0) as link:
+        setup.solve(0.1)
+        seen = link.draws
+        assert seen["learned"] > 20
+    setup.solve(0.1)
+    assert link.draws == seen, "after detach the planner is plain OMPL's"
+
+
+@pytest.mark.parametrize("planner", ["RRT", "RRTstar", "InformedRRTstar", "PRM"])
+def test_attach_after_a_solve(two_walls: GridMap, corridor: Heatmap, planner: str) -> None:
+    """Samplers and solutions of an earlier run do not keep the planner from drawing."""
+    setup = make_setup(two_walls, planner)
+    setup.solve(0.1)
+    with attach(setup, corridor, seed=0) as link:
+        setup.solve(0.2)
+        assert link.draws["learned"] > 20
+
+
+def test_attach_with_informed_sampling_of_rrtstar(two_walls: GridMap, corridor: Heatmap) -> None:
+    setup = make_setup(two_walls, "RRTstar")
+    setup.getPlanner().setInformedSampling(True)
+    with attach(setup, corridor, seed=0) as link:
+        setup.solve(0.2)
+        assert link.draws["learned"] > 20
+    assert setup.getPlanner().getInformedSampling()
+
+
+def test_attach_twice_is_refused(two_walls: GridMap, corridor: Heatmap) -> None:
+    setup = make_setup(two_walls, "RRTstar")
+    link = attach(setup, corridor)
+    with pytest.raises(PlannerError, match="detach"):
+        attach(setup, corridor)
+    link.detach()
+    attach(setup, corridor).detach()
+
+
+def test_planner_cleared_alone_draws_again(two_walls: GridMap, corridor: Heatmap) -> None:
+    setup = make_setup(two_walls, "RRT")
+    with attach(setup, corridor, seed=0) as link:
+        setup.solve(0.5)
+        seen = link.draws["learned"]
+        setup.getPlanner().clear()
+        assert compat.is_exact(setup.solve(2.0))
+        assert link.draws["learned"] > seen
+
+
+@pytest.mark.parametrize("planner", ["RRT", "InformedRRTstar"])
+def test_detach_leaves_a_new_goal_alone(
+    two_walls: GridMap, corridor: Heatmap, planner: str
+) -> None:
+    setup = make_setup(two_walls, planner)
+    link = attach(setup, corridor)
+    setup.solve(0.1)
+    setup.clear()
+    space = setup.getStateSpace()
+    new = make_state(space, 10.0, 40.0)
+    setup.setGoalState(new, 2.0)
+    link.detach()
+    assert compat.is_exact(setup.solve(1.0))
+    assert np.hypot(*(path_end(setup) - (10, 40))) <= 2
+
+
+def test_attach_needs_a_start_and_a_goal_to_sample(two_walls: GridMap, corridor: Heatmap) -> None:
+    setup = make_setup(two_walls, "RRT")
+    setup.getProblemDefinition().clearStartStates()
+    with pytest.raises(PlannerError, match="start and the goal"):
+        attach(setup, corridor)
+
+    class Near(ob.GoalRegion):  # type: ignore[misc]
+        def distanceGoal(self, state: Any) -> float:  # noqa: N802
+            return abs(state[0] - 200.0)
+
+    setup = make_setup(two_walls, "RRT")
+    setup.setGoal(Near(setup.getSpaceInformation()))
+    with pytest.raises(PlannerError, match="goal that can be sampled"):
+        attach(setup, corridor)
+
+
+def test_several_starts_and_goals(two_walls: GridMap, corridor: Heatmap) -> None:
+    setup = make_setup(two_walls, "InformedRRTstar")
+    si, space = setup.getSpaceInformation(), setup.getStateSpace()
+    setup.addStartState(make_state(space, 30.0, 30.0))
+    goals = ob.GoalStates(si)
+    goals.setThreshold(2.0)
+    keep = [make_state(space, x, 240.0) for x in (200.0, 240.0)]
+    for goal in keep:
+        goals.addState(goal)
+    setup.setGoal(goals)
+    with attach(setup, corridor, seed=0) as link:
+        assert compat.is_exact(setup.solve(0.5))
+        assert link.draws["learned"] > 100
+        end = path_end(setup)
+        assert min(np.hypot(*(end - (x, 240))) for x in (200, 240)) <= 2

@@ -175,7 +175,7 @@ BAD = [
     ({"planner": "RRTstarr"}, PlannerError, "no planner 'RRTstarr'.*RRTstar"),
     ({"planner": "SimpleSetup"}, PlannerError, "no planner 'SimpleSetup'"),
     ({"sampler": "magic"}, ConfigError, "no sampler 'magic'.*corridor"),
-    ({"planner": "BITstar", "sampler": "corridor"}, PlannerError, "no hook reaches BITstar"),
+    ({"planner": "AORRTC"}, PlannerError, "no planner 'AORRTC' to use"),
     ({"time": 0}, ConfigError, "time"),
     ({"time": np.nan}, ConfigError, "time"),
     ({"iterations": 0}, ConfigError, "iterations"),
@@ -186,6 +186,14 @@ BAD = [
     ({"seed": -1}, ConfigError, "seed"),
     ({"uniform_fraction": 0, "sampler": "corridor"}, ConfigError, "uniform_fraction"),
     ({"goal_tolerance": -1}, ConfigError, "goal_tolerance"),
+    ({"seed": 1.5}, ConfigError, "seed is a whole number"),
+    ({"time": "1"}, ConfigError, "time"),
+    ({"time": None}, ConfigError, "time"),
+    ({"iterations": 10.5}, ConfigError, "iterations"),
+    ({"radius": None}, MapError, "radius"),
+    ({"uniform_fraction": 0}, ConfigError, "uniform_fraction"),
+    ({"uniform_fraction": "x"}, ConfigError, "uniform_fraction"),
+    ({"sampler": "learned", "heatmap": np.ones((3, 3))}, HeatmapError, "shape"),
     ({"sampler": "uniform", "model": "file"}, ConfigError, "uses no model"),
     ({"grid": "missing.png"}, MapError, "missing.png"),
 ]
@@ -213,6 +221,23 @@ def test_heatmap_of_another_map(two_walls: GridMap) -> None:
     other = Heatmap.uniform(GridMap(np.ones((5, 5))))
     with pytest.raises(HeatmapError, match=r"\(256, 256\).*\(5, 5\)"):
         plan(two_walls, START, GOAL, heatmap=other)
+
+
+def test_numpy_scalars_are_numbers(two_walls: GridMap) -> None:
+    result = plan(
+        two_walls, START, GOAL, "RRT", "corridor", np.float32(5), np.int64(5000), np.float32(20),
+        seed=np.int64(3), goal_tolerance=np.float32(1),
+    )  # fmt: skip
+    check(result, two_walls)
+    json.dumps(result.to_dict(), allow_nan=False)
+
+
+@pytest.mark.parametrize("planner", sorted(compat.planner_names() - {"BITstar"}))
+def test_every_planner_comes_back(two_walls: GridMap, planner: str) -> None:
+    result = plan(two_walls, START, GOAL, planner, "uniform", 0.3, seed=1)
+    assert result.planning_s < 2
+    if result.solved:
+        check(result, two_walls)
 
 
 def test_prm_and_iterations(two_walls: GridMap) -> None:

@@ -13,6 +13,7 @@ from cbagan_ompl import (
     GridMap,
     GridValidityChecker,
     Heatmap,
+    HeatmapError,
     HeatmapStateSampler,
     HeatmapValidStateSampler,
     state_sampler_allocator,
@@ -36,19 +37,10 @@ class Fake:
         self.values[axis] = value
 
 
-class FakeSpace:
-    """Lets a sampler enforce bounds on fake states."""
-
-    def enforceBounds(self, state: Fake) -> None:  # noqa: N802
-        state.values = [min(max(value, 0.0), 256.0) for value in state.values]
-
-
 @pytest.fixture
 def sampler(two_walls: GridMap, corridor: Heatmap) -> Any:
     space = compat.plane_space(*two_walls.bounds)
-    made = HeatmapStateSampler(space, corridor, uniform_fraction=0.1, seed=4)
-    made._space = FakeSpace()
-    return made
+    return HeatmapStateSampler(space, corridor, uniform_fraction=0.1, seed=4)
 
 
 def test_all_three_methods(corridor: Heatmap, sampler: Any) -> None:
@@ -150,3 +142,34 @@ def test_valid_state_sampler_obeys_the_validity_checker(
     sampler.setNrAttempts(5)
     assert not sampler.sample(typed)
     assert issubclass(HeatmapValidStateSampler, ob.ValidStateSampler)
+
+
+def test_a_script_can_ask_for_samples(two_walls: GridMap, corridor: Heatmap) -> None:
+    """With the kind of state that a script makes: ob.State on OMPL 1.7."""
+    setup = make_setup(two_walls)
+    space = setup.getStateSpace()
+    state, near = compat.new_state(space), compat.new_state(space)
+    near[0], near[1] = 20.0, 20.0
+    sampler = HeatmapStateSampler(space, corridor, seed=1)
+    sampler.sampleUniform(state)
+    sampler.sampleUniformNear(state, near, 5.0)
+    assert max(abs(state[0] - 20), abs(state[1] - 20)) <= 5
+    sampler.sampleGaussian(state, near, 1.0)
+    valid = HeatmapValidStateSampler(setup.getSpaceInformation(), corridor, seed=1)
+    assert valid.sample(state)
+    assert valid.sampleNear(state, near, 5.0)
+    assert max(abs(state[0] - 20), abs(state[1] - 20)) <= 5
+
+
+def test_draws_stay_in_the_bounds_of_the_space(two_walls: GridMap, corridor: Heatmap) -> None:
+    low, high = np.array([50.0, 80.0]), np.array([180.0, 145.0])
+    sampler, state = HeatmapStateSampler(compat.plane_space(low, high), corridor, seed=1), Fake()
+    for _ in range(500):
+        sampler.sampleUniform(state)
+        assert (low <= state.values).all()
+        assert (state.values <= high).all()
+        sampler.sampleUniformNear(state, Fake(60, 81), 20.0)
+        assert (low <= state.values).all()
+    elsewhere = compat.plane_space(np.array([-50.0, 0.0]), np.array([-5.0, 10.0]))
+    with pytest.raises(HeatmapError, match="coordinates of the map"):
+        HeatmapStateSampler(elsewhere, corridor)

@@ -13,10 +13,17 @@ from ..draws import DEFAULT_UNIFORM_FRACTION, DrawStream
 from ..errors import PlannerError
 from ..heatmap import Heatmap
 from . import compat, samplers
+from .compat import ob, ou
 from .goal_injection import InjectedGoal
-from .hooks import GOAL_INJECTION, INFORMED, STATE_SAMPLER, VALID_STATE_SAMPLER, hook_of
-from .positions import Positions, positions_of
-from .progress import PlannerProgress
+from .hooks import (
+    GOAL_INJECTION,
+    KEEP_SAMPLER,
+    STATE_SAMPLER,
+    VALID_STATE_SAMPLER,
+    hook_of,
+)
+from .positions import Positions, bounds_of, positions_of
+from .progress import PlannerProgress, is_followed
 
 
 class Attachment:
@@ -70,11 +77,12 @@ def attach(
 ) -> Attachment:
     """Make the planner of a SimpleSetup draw from a heat map.
 
-    Call it after ``setup.setPlanner(...)`` and after the start and the goal were set, before
-    ``solve`` (or after ``clear``). The planner's parameters stay as they are but for what the
-    hook needs: the goal bias under goal injection, and for informed planners under a
-    StateSampler, rejection instead of direct informed sampling. Until :meth:`Attachment.detach`
-    the planner and the heat map keep each other alive.
+    Call it after ``setup.setPlanner(...)`` and after the planner's options, the start and the
+    goal were set. What the planner has done so far is cleared, because samplers that it has made
+    go only with its tree. Its options stay as they are but for what the hook needs: the goal bias
+    under goal injection, and for informed sampling under a StateSampler, rejection instead of
+    direct sampling. For another planner, start or goal: detach, set it, attach again. Until
+    :meth:`Attachment.detach` the planner and the heat map keep each other alive.
 
     Args:
         setup: an ``ompl.geometric.SimpleSetup``.
@@ -86,21 +94,24 @@ def attach(
         A handle with ``.hook``, ``.draws`` and ``.detach()``.
 
     Raises:
-        PlannerError: no planner is set, no hook of this build reaches it, its space has no
-            (x, y), or the start or goal is missing.
+        PlannerError: no planner is set, no hook of this build reaches it, it draws from a heat
+            map already, its space has no (x, y), the start or goal is missing, or the goal
+            cannot be sampled.
+        HeatmapError: the heat map is 0 everywhere in the bounds of the space.
         ConfigError: ``uniform_fraction`` outside (0, 1].
     """
     planner = setup.getPlanner()
-    if planner is None:
-        raise PlannerError("attach needs a planner: call setup.setPlanner(...) first")
-    if setup.getGoal() is None:
-        raise PlannerError("attach needs the task: set the start and the goal of the setup first")
-    name = _class_name(planner)
-    hook = hook_of(name)
+    _check_attachable(setup, planner)
+    hook = hook_of(_class_name(planner))
     stream = DrawStream(heatmap, uniform_fraction, seed)
-    positions = positions_of(setup.getStateSpace(), stream.rng)
+    space = setup.getStateSpace()
+    positions = positions_of(space, stream.rng)
+    stream.keep_inside(*bounds_of(space))
+    # Samplers and solutions that are there already would keep the planner from asking for draws.
+    planner.clear()
+    setup.getProblemDefinition().clearSolutionPaths()
     progress = PlannerProgress(setup, positions)
-    if name in INFORMED:
+    if _is_informed(planner):
         stream.follow(progress.path_length, progress.informed_set)
     undo_hook = _INSTALL[hook](_Parts(setup, planner, positions, stream, progress))
 
@@ -110,6 +121,26 @@ def attach(
         undo_hook()
 
     return Attachment(hook, stream, undo)
+
+
+def _check_attachable(setup: Any, planner: Any) -> None:
+    if planner is None:
+        raise PlannerError("attach needs a planner: call setup.setPlanner(...) first")
+    if setup.getGoal() is None or setup.getProblemDefinition().getStartStateCount() == 0:
+        raise PlannerError("attach needs the task: set the start and the goal of the setup first")
+    if not isinstance(setup.getGoal(), ob.GoalSampleableRegion):
+        raise PlannerError(
+            "attach needs a goal that can be sampled, such as a GoalState or GoalStates, this one "
+            f"is a {type(setup.getGoal()).__name__}"
+        )
+    if is_followed(planner):
+        raise PlannerError(
+            "this planner draws from a heat map already: call detach() of its attachment first"
+        )
+
+
+def _is_informed(planner: Any) -> bool:
+    return hasattr(planner, "getInformedSampling") and planner.getInformedSampling()
 
 
 def _class_name(planner: Any) -> str:
@@ -134,16 +165,28 @@ class _Parts:
 
 def _use_state_sampler(parts: _Parts) -> Callable[[], None]:
     space, stream = parts.setup.getStateSpace(), parts.stream
+    planner, name = parts.planner, _class_name(parts.planner)
     space.setStateSamplerAllocator(samplers.state_sampler_allocator(stream.heatmap, stream=stream))
-    informed = _class_name(parts.planner) in INFORMED
-    restore = _reject_uninformed(parts.planner) if informed else None
+    restore = _reject_uninformed(planner) if _is_informed(planner) else None
+    keeps_sampler = name in KEEP_SAMPLER
+    if keeps_sampler:
+        _renew_sampler(planner)
 
     def undo() -> None:
         space.clearStateSamplerAllocator()
         if restore is not None:
             restore()
+        if keeps_sampler:
+            _renew_sampler(planner)
 
     return undo
+
+
+def _renew_sampler(planner: Any) -> None:
+    """Set a planner up again, which says something of it on OMPL's log."""
+    if planner.isSetup():
+        with compat.log_level(ou.LOG_ERROR):
+            planner.setup()
 
 
 def _reject_uninformed(planner: Any) -> Callable[[], None]:
@@ -172,11 +215,13 @@ def _inject_goals(parts: _Parts) -> Callable[[], None]:
     setup, planner = parts.setup, parts.planner
     original, bias = setup.getGoal(), planner.getGoalBias()
     si = setup.getSpaceInformation()
-    setup.setGoal(InjectedGoal(si, original, parts.positions, parts.stream, parts.progress))
+    injected = InjectedGoal(si, original, parts.positions, parts.stream, parts.progress)
+    setup.setGoal(injected)
     planner.setGoalBias(1.0)
 
     def undo() -> None:
-        setup.setGoal(original)
+        if setup.getGoal() is injected:
+            setup.setGoal(original)
         planner.setGoalBias(bias)
 
     return undo

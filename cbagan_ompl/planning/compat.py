@@ -8,9 +8,12 @@ from __future__ import annotations
 
 import ctypes
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, redirect_stdout
 from importlib.metadata import PackageNotFoundError, version
+from io import StringIO
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -34,6 +37,7 @@ if BOOST_PYTHON and not _OMPL_WAS_LOADED:
 
 from ompl import base as ob  # noqa: E402
 from ompl import geometric as og  # noqa: E402
+from ompl import tools as ot  # noqa: E402
 from ompl import util as ou  # noqa: E402
 
 __all__ = ["BOOST_PYTHON", "HAS_STATE_SAMPLER_ALLOCATOR", "ob", "og", "ou"]
@@ -41,14 +45,17 @@ __all__ = ["BOOST_PYTHON", "HAS_STATE_SAMPLER_ALLOCATOR", "ob", "og", "ou"]
 #: Whether planners can be given a StateSampler (OMPL 1.7; not bound in 2.0.0 and 2.0.1).
 HAS_STATE_SAMPLER_ALLOCATOR = hasattr(ob.StateSpace, "setStateSamplerAllocator")
 
-# Planners that crash the interpreter by themselves, without any code of ours.
-_BROKEN = frozenset({"AORRTC", "LazyLBTRRT"})
+# Planners that crash the interpreter by themselves, without any code of ours: AORRTC (2.0.1) and
+# LazyLBTRRT (1.7.0) while they plan or are freed, the others at exit after any use on 1.7.0.
+_BROKEN = {"AORRTC", "LazyLBTRRT"} | ({"ABITstar", "AITstar", "BITstar"} if BOOST_PYTHON else set())
 
 # Planners for other spaces than those of a map.
 _OTHER_SPACES = frozenset({"STRRTstar"})
 
 #: Planners that never come back from a solve whose termination condition is a Python function.
-HANGS_ON_PYTHON_TERMINATION = frozenset() if BOOST_PYTHON else frozenset({"PRM", "PRMstar"})
+HANGS_ON_PYTHON_TERMINATION = frozenset(
+    {"SPARS", "SPARStwo"} if BOOST_PYTHON else {"PRM", "PRMstar"}
+)
 
 
 def ompl_version() -> str:
@@ -76,9 +83,9 @@ if BOOST_PYTHON and _OMPL_WAS_LOADED:
     _skip_static_destructors()
 
 
-def _wrapped(wrapper: str, function: Callable[..., Any]) -> Any:
+def _wrapped(wrapper: str, function: Callable[..., Any], home: Any = ob) -> Any:
     """Boost.Python wants callbacks in a typed std::function, nanobind takes them as they are."""
-    return getattr(ob, wrapper)(function) if hasattr(ob, wrapper) else function
+    return getattr(home, wrapper)(function) if hasattr(home, wrapper) else function
 
 
 def validity_function(function: Callable[[Any], bool]) -> Any:
@@ -99,6 +106,44 @@ def valid_state_sampler_allocator(function: Callable[[Any], Any]) -> Any:
 def termination_condition(function: Callable[[], bool]) -> Any:
     """A planner termination condition that asks a Python function."""
     return ob.PlannerTerminationCondition(_wrapped("PlannerTerminationConditionFn", function))
+
+
+def new_benchmark(
+    setup: Any,
+    name: str,
+    before_run: Callable[[Any], None],
+    after_run: Callable[[Any, Any], None],
+) -> Any:
+    """An ``ompl.tools.Benchmark`` with its two events around each run."""
+    benchmark = ot.Benchmark(setup, name)
+    benchmark.setPreRunEvent(_wrapped("PreSetupEvent", before_run, ot))
+    benchmark.setPostRunEvent(_wrapped("PostSetupEvent", after_run, ot))
+    return benchmark
+
+
+def benchmark_request() -> Any:
+    """What ``Benchmark.benchmark`` takes: limits and options, as attributes to set."""
+    return ot.Benchmark.Request() if BOOST_PYTHON else ot.Request()
+
+
+def fill_statistics_database(logs: Sequence[Path], database: Path) -> bool:
+    """Run OMPL's own ``ompl_benchmark_statistics`` on logs.
+
+    Args:
+        logs: that Benchmark has saved.
+        database: SQLite file to be written.
+
+    Returns:
+        Whether this build has it: OMPL 1.7 does not.
+    """
+    if not hasattr(ot, "readBenchmarkLog"):
+        return False
+    # It prints what it reads, and leaves closing the database to the garbage collector.
+    with redirect_stdout(StringIO()), warnings.catch_warnings():
+        warnings.simplefilter("ignore", ResourceWarning)
+        ot.readBenchmarkLog(str(database), [str(log) for log in logs], False)
+        ot.computeViews(str(database), False)
+    return True
 
 
 def plane_space(low: NDArray[np.float64], high: NDArray[np.float64]) -> Any:
@@ -135,8 +180,8 @@ def best_cost(planner: Any) -> float:
 
 
 def typed_state(state: Any) -> Any:
-    """The state as callbacks see it, from one made by :func:`new_state`; keep the latter alive."""
-    return state() if BOOST_PYTHON else state
+    """The state as callbacks see it; one made by :func:`new_state` must be kept alive meanwhile."""
+    return state() if BOOST_PYTHON and isinstance(state, ob.State) and callable(state) else state
 
 
 def start_states(planner: Any) -> list[Any]:
@@ -212,8 +257,8 @@ def planner_class(name: str) -> Any:
 def planner_names() -> frozenset[str]:
     """Names of the geometric planners of this build that can be used on a map.
 
-    Left out are AORRTC (2.0.1) and LazyLBTRRT (1.7.0), which crash the interpreter by themselves,
-    and STRRTstar, which plans in space-time only.
+    Left out are those that crash the interpreter by themselves, and STRRTstar, which plans in
+    space-time only.
     """
     names = {
         name

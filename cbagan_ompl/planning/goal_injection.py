@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from ..draws import DrawStream
-from ..errors import PlannerError
 from .compat import ob
 from .positions import Positions
 from .progress import PlannerProgress
@@ -41,11 +40,6 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
         progress: PlannerProgress,
     ) -> None:
         super().__init__(si)
-        if not isinstance(original, ob.GoalSampleableRegion):
-            raise PlannerError(
-                "goal injection needs a goal that can be sampled, such as a GoalState or "
-                f"GoalStates, this one is a {type(original).__name__}"
-            )
         self.setThreshold(original.getThreshold())
         self._original = original
         self._positions = positions

@@ -9,18 +9,17 @@ STATE_SAMPLER = "state-sampler"
 VALID_STATE_SAMPLER = "valid-state-sampler"
 GOAL_INJECTION = "goal-injection"
 
-# Planners that sample an informed set once they know a solution.
-INFORMED = frozenset({"InformedRRTstar", "SORRTstar"})
+# Planners that make their sampler when they are set up, and keep it for good.
+KEEP_SAMPLER = frozenset({"LazyPRM", "LazyPRMstar"})
 
 # Planners that draw from a StateSampler of the space.
-_DRAW_STATES = INFORMED | {
+_DRAW_STATES = KEEP_SAMPLER | {
     "BFMT",
     "FMT",
+    "InformedRRTstar",
     "KPIECE1",
     "LBKPIECE1",
     "LBTRRT",
-    "LazyPRM",
-    "LazyPRMstar",
     "LazyRRT",
     "PDST",
     "RRT",
@@ -28,6 +27,7 @@ _DRAW_STATES = INFORMED | {
     "RRTXstatic",
     "RRTsharp",
     "RRTstar",
+    "SORRTstar",
     "SST",
     "TRRT",
 }
@@ -49,7 +49,7 @@ _DRAW_VALID_STATES = frozenset(
 )
 
 # Planners that grow their tree towards samples of the goal with a settable probability.
-_SAMPLE_GOAL = INFORMED | {"RRT", "RRTstar"}
+_SAMPLE_GOAL = frozenset({"InformedRRTstar", "RRT", "RRTstar", "SORRTstar"})
 
 
 def hook_of(planner: str) -> str:

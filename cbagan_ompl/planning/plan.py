@@ -5,7 +5,8 @@ from __future__ import annotations
 import secrets
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
-from math import inf, isfinite
+from math import inf, isfinite, nan
+from operator import index
 from os import PathLike
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -13,15 +14,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..draws import DEFAULT_UNIFORM_FRACTION
+from ..draws import DEFAULT_UNIFORM_FRACTION, check_uniform_fraction
 from ..errors import ConfigError
 from ..gridmap import GridMap
 from ..heatmap import Heatmap
 from . import compat
 from .attach import attach
-from .compat import og, ou
+from .compat import ou
 from .hooks import hook_of
-from .validity import GridMotionValidator, GridValidityChecker
+from .problem import checked_path, path_length, set_range, simple_setup
+from .progress import CostHistory
 
 if TYPE_CHECKING:
     from ..network.predictor import Predictor
@@ -51,11 +53,6 @@ _STOP_AT_FIRST = frozenset(
         "TRRT",
     }
 )
-
-_LEAST_THRESHOLD = float(np.finfo(np.float64).eps)
-
-# Slack of the check that a path ends in the goal region, for the rounding of a distance.
-_ROUNDING = 1e-9
 
 #: What a result names its sampler when the caller brought the heat map.
 OWN_HEATMAP = "heatmap"
@@ -144,7 +141,7 @@ def plan(
     seed: int | None = None,
     uniform_fraction: float = DEFAULT_UNIFORM_FRACTION,
     model: Predictor | str | PathLike[str] | None = None,
-    heatmap: Heatmap | None = None,
+    heatmap: Heatmap | ArrayLike | None = None,
     simplify: bool = False,
     *,
     goal_tolerance: float | None = None,
@@ -170,7 +167,8 @@ def plan(
         uniform_fraction: share of draws that stays uniform over free space, in (0, 1].
         model: for the learned sampler, a loaded model or the file of one; the bundled model by
             default.
-        heatmap: to be drawn from in place of the learned one, in this map's grid.
+        heatmap: to be drawn from in place of the learned one: of this map, or an array (H, W) as
+            :class:`Heatmap` takes it.
         simplify: let OMPL's path simplifier shorten the path afterwards.
         goal_tolerance: how far from the goal a path may end, world units; by default a pixel. At 0
             paths end in the goal itself.
@@ -190,25 +188,36 @@ def plan(
     source = grid if isinstance(grid, GridMap) else GridMap.load(grid)
     space_map = source.inflated(radius)
     task = space_map.check_task(start, goal)
-    tolerance = space_map.resolution if goal_tolerance is None else goal_tolerance
-    _check_options(time, iterations, range, tolerance, seed)
+    tolerance = space_map.resolution
+    if goal_tolerance is not None:
+        tolerance = _number("goal_tolerance", goal_tolerance, 0.0)
+    time_limit = _positive("time", time)
+    longest_edge = None if range is None else _positive("range", range)
+    count_limit = None if iterations is None else _whole("iterations", iterations, 1)
+    used_seed = secrets.randbits(32) if seed is None else _whole("seed", seed, 0)
+    check_uniform_fraction(uniform_fraction)
     kind = compat.planner_class(planner)
     if sampler != "uniform":
         hook_of(planner)
-    used_seed = secrets.randbits(32) if seed is None else seed
-    name, provide = _provider(sampler, model, heatmap)
+    name, provide = heatmap_provider(sampler, model, heatmap)
 
     with compat.log_level(ou.LOG_ERROR):
         compat.seed_ompl(used_seed)
-        setup = _simple_setup(space_map, task, kind, range, tolerance)
+        setup = simple_setup(space_map, task, tolerance)
+        setup.setPlanner(kind(setup.getSpaceInformation()))
+        if longest_edge is not None and not set_range(setup.getPlanner(), longest_edge):
+            raise ConfigError(f"{planner} has no range to set: leave it out")
+        setup.setup()
         began = perf_counter()
         drawn_from = provide(space_map, *task) if provide is not None else None
-        link = drawn_from and attach(setup, drawn_from, uniform_fraction, used_seed)
+        link = None
+        if drawn_from is not None:
+            link = attach(setup, drawn_from, uniform_fraction, used_seed)
         inference_s = perf_counter() - began if link else 0.0
         try:
-            run = _solve(setup, planner, time, iterations)
+            run = _solve(setup, planner, time_limit, count_limit)
             simplify_s = _simplify(setup) if simplify and run.exact else 0.0
-            path = _checked_path(setup, space_map, task, tolerance) if run.exact else None
+            path = checked_path(setup, space_map, task, tolerance) if run.exact else None
             data = compat.planner_data(setup.getPlanner())
             return PlanResult(
                 solved=path is not None,
@@ -218,12 +227,12 @@ def plan(
                 hook=link.hook if link else None,
                 ompl_version=compat.ompl_version(),
                 seed=used_seed,
-                map=space_map.name,
+                map=source.name,
                 start=task[0],
                 goal=task[1],
                 goal_tolerance=tolerance,
                 path=np.empty((0, 2)) if path is None else path,
-                cost=inf if path is None else _length(path),
+                cost=inf if path is None else path_length(path),
                 inference_s=inference_s,
                 planning_s=run.planning_s,
                 simplify_s=simplify_s,
@@ -241,30 +250,50 @@ def plan(
                 link.detach()
 
 
-def _check_options(
-    time: float, iterations: int | None, range: float | None, tolerance: float, seed: int | None
-) -> None:
-    if not (isfinite(time) and time > 0):
-        raise ConfigError(f"time is the planner's limit in seconds, above 0, got {time}")
-    if iterations is not None and iterations < 1:
-        raise ConfigError(f"iterations must be at least 1, got {iterations}")
-    if range is not None and not (isfinite(range) and range > 0):
-        raise ConfigError(f"range is the longest edge in world units, above 0, got {range}")
-    if not (isfinite(tolerance) and tolerance >= 0):
-        raise ConfigError(f"goal_tolerance is a length of at least 0, got {tolerance}")
-    if seed is not None and seed < 0:
-        raise ConfigError(f"seed must be at least 0, got {seed}")
+def _number(name: str, value: float, least: float) -> float:
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = nan
+    if not (isfinite(number) and number >= least) or isinstance(value, str):
+        raise ConfigError(f"{name} is a finite number of at least {least:g}, got {value!r}")
+    return number
 
 
-_Provider = Callable[[GridMap, ArrayLike, ArrayLike], Heatmap]
+def _positive(name: str, value: float) -> float:
+    number = _number(name, value, 0.0)
+    if number == 0:
+        raise ConfigError(f"{name} must be above 0, got {value!r}")
+    return number
 
 
-def _provider(
+def _whole(name: str, value: int, least: int) -> int:
+    try:
+        number = index(value)
+    except TypeError:
+        number = least - 1
+    if number < least or isinstance(value, bool):
+        raise ConfigError(f"{name} is a whole number of at least {least}, got {value!r}")
+    return number
+
+
+#: Makes the heat map of a map, a start and a goal.
+Provider = Callable[[GridMap, ArrayLike, ArrayLike], Heatmap]
+
+
+def heatmap_provider(
     sampler: str,
-    model: Predictor | str | PathLike[str] | None,
-    heatmap: Heatmap | None,
-) -> tuple[str, _Provider | None]:
-    """Name of the sampler, and what makes its heat map; a model is loaded here, once."""
+    model: Predictor | str | PathLike[str] | None = None,
+    heatmap: Heatmap | ArrayLike | None = None,
+) -> tuple[str, Provider | None]:
+    """Name of the sampler, and what makes its heat map; a model is loaded here, once.
+
+    Arguments as for :func:`plan`. OMPL's own sampler has no heat map.
+
+    Raises:
+        ConfigError: an unknown sampler, or options that do not go together.
+        ModelError: an unusable model file.
+    """
     if sampler not in SAMPLERS:
         raise ConfigError(f"there is no sampler {sampler!r}; there are {', '.join(SAMPLERS)}")
     if sampler != "learned" and (model is not None or heatmap is not None):
@@ -275,8 +304,8 @@ def _provider(
     if model is not None and heatmap is not None:
         raise ConfigError("a model and a heat map were both given: choose one")
     if heatmap is not None:
-        given = heatmap
-        return OWN_HEATMAP, lambda grid, start, goal: Heatmap(given.values, grid)
+        values = heatmap.values if isinstance(heatmap, Heatmap) else heatmap
+        return OWN_HEATMAP, lambda grid, start, goal: Heatmap(values, grid)
     if sampler == "uniform":
         return sampler, None
     if sampler == "corridor":
@@ -287,33 +316,6 @@ def _provider(
 
     predictor = model if isinstance(model, Predictor) else load_model(model)
     return sampler, predictor.predict
-
-
-def _simple_setup(
-    grid: GridMap,
-    task: tuple[NDArray[np.float64], NDArray[np.float64]],
-    kind: Any,
-    range: float | None,
-    tolerance: float,
-) -> Any:
-    space = compat.plane_space(*grid.bounds)
-    setup = og.SimpleSetup(space)
-    si = setup.getSpaceInformation()
-    setup.setStateValidityChecker(GridValidityChecker(si, grid))
-    si.setMotionValidator(GridMotionValidator(si, grid))
-    start, goal = compat.new_state(space), compat.new_state(space)
-    for state, point in ((start, task[0]), (goal, task[1])):
-        state[0], state[1] = float(point[0]), float(point[1])
-    # A goal is reached at less than its threshold; OMPL's own default is the least one as well.
-    setup.setStartAndGoalStates(start, goal, max(float(tolerance), _LEAST_THRESHOLD))
-    instance = kind(si)
-    if range is not None:
-        if not hasattr(instance, "setRange"):
-            raise ConfigError(f"{kind.__name__} has no range to set: leave it out")
-        instance.setRange(float(range))
-    setup.setPlanner(instance)
-    setup.setup()
-    return setup
 
 
 @dataclass(frozen=True)
@@ -340,7 +342,7 @@ def _solve(setup: Any, name: str, time: float, iterations: int | None) -> _Run:
     began = perf_counter()
     status = setup.solve(condition)
     planning_s = perf_counter() - began
-    progress = np.array(watch.progress if watch else []).reshape(-1, 2)
+    progress = np.array(watch.history.costs if watch else []).reshape(-1, 2)
     first = planning_s if name in _STOP_AT_FIRST else None
     return _Run(
         exact=compat.is_exact(status),
@@ -357,19 +359,12 @@ class _Watch:
 
     def __init__(self, planner: Any, time: float, iterations: int | None) -> None:
         self.iterations = 0
-        self.progress: list[tuple[float, float]] = []
+        self.history = CostHistory(planner)
         self._limit = inf if iterations is None else iterations
-        self._planner = planner if hasattr(planner, "bestCost") else None
-        self._best = inf
-        self._began = perf_counter()
-        self._end = self._began + time
+        self._time = time
 
     def stop(self) -> bool:
-        now = perf_counter()
-        if self._planner is not None and (cost := compat.best_cost(self._planner)) < self._best:
-            self._best = cost
-            self.progress.append((now - self._began, cost))
-        if self.iterations >= self._limit or now >= self._end:
+        if self.history.look() >= self._time or self.iterations >= self._limit:
             return True
         self.iterations += 1
         return False
@@ -379,20 +374,3 @@ def _simplify(setup: Any) -> float:
     began = perf_counter()
     setup.simplifySolution()
     return perf_counter() - began
-
-
-def _checked_path(
-    setup: Any,
-    grid: GridMap,
-    task: tuple[NDArray[np.float64], NDArray[np.float64]],
-    tolerance: float,
-) -> NDArray[np.float64] | None:
-    """The planner's path, or None when it is no path of the task after all."""
-    path = compat.path_positions(setup.getSolutionPath())
-    starts = np.array_equal(path[0], task[0])
-    ends = np.hypot(*(path[-1] - task[1])) <= tolerance + _ROUNDING
-    return path if starts and ends and grid.path_is_free(path) else None
-
-
-def _length(path: NDArray[np.float64]) -> float:
-    return float(np.hypot(*np.diff(path, axis=0).T).sum())

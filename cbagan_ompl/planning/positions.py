@@ -6,6 +6,7 @@ from math import pi
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import PlannerError
 from .compat import ob
@@ -76,3 +77,9 @@ def positions_of(space: Any, seed: int | np.random.Generator | None = None) -> P
         "a 2-D heat map serves RealVectorStateSpace(2), SE2StateSpace, DubinsStateSpace and "
         f"ReedsSheppStateSpace, not {type(space).__name__} of dimension {space.getDimension()}"
     )
+
+
+def bounds_of(space: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lower and upper bounds of the positions in a space that :func:`positions_of` serves."""
+    bounds = space.getBounds()
+    return np.array(list(bounds.low)[:2]), np.array(list(bounds.high)[:2])

@@ -1,16 +1,17 @@
-"""What callbacks may know of the planner that calls them."""
+"""What callbacks may know of the planner that calls them, and what they note of it."""
 
 from __future__ import annotations
 
 import atexit
 import weakref
 from math import inf
+from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from ..draws import InformedSet
-from .compat import best_cost, new_state, ob, start_states, typed_state
+from .compat import best_cost, new_state, ob, planner_data, start_states, typed_state
 from .positions import Positions
 
 # A goal region without end is represented by this many samples of it in the informed set.
@@ -50,7 +51,10 @@ class PlannerProgress:
             return False
         if self._counts_iterations:
             return self._planner.numIterations() not in (0, self._last_iteration)
-        return not self._problem.hasExactSolution()
+        # A solution may be older than the tree, after the planner alone was cleared.
+        return not (
+            self._problem.hasExactSolution() and planner_data(self._planner).numGoalVertices()
+        )
 
     def note_sample(self) -> None:
         """Remember the iteration that has had its sample."""
@@ -85,9 +89,44 @@ class PlannerProgress:
         starts = [self._positions.read(start) for start in start_states(self._planner)]
         return InformedSet(np.array(starts), np.array(goals), self._goal.getThreshold())
 
+    def refers_to(self, planner: Any) -> bool:
+        """Whether this is the progress of a planner."""
+        return self._planner is planner
+
     def release(self) -> None:
         """Let go of the planner and its task."""
         self._planner = self._problem = self._goal = None
+
+
+class CostHistory:
+    """Each better solution of a planner, with the time at which it was seen.
+
+    Attributes:
+        costs: (seconds since the history began, cost); stays empty for planners that do not tell
+            the cost of their best solution.
+
+    Args:
+        planner: an OMPL planner, about to plan.
+    """
+
+    def __init__(self, planner: Any) -> None:
+        self.costs: list[tuple[float, float]] = []
+        self._planner = planner if hasattr(planner, "bestCost") else None
+        self._best = inf
+        self._began = perf_counter()
+
+    def look(self) -> float:
+        """Note the best cost if it is a better one; seconds since the history began."""
+        elapsed = perf_counter() - self._began
+        if self._planner is not None and (cost := best_cost(self._planner)) < self._best:
+            self._best = cost
+            self.costs.append((elapsed, cost))
+        return elapsed
+
+
+def is_followed(planner: Any) -> bool:
+    """Whether callbacks refer to a planner at the moment."""
+    return any(progress.refers_to(planner) for progress in _alive)
 
 
 _alive: weakref.WeakSet[PlannerProgress] = weakref.WeakSet()

@@ -10,8 +10,8 @@ import numpy as np
 from ..draws import DEFAULT_UNIFORM_FRACTION, DrawStream
 from ..heatmap import Heatmap
 from . import compat
-from .compat import ob
-from .positions import positions_of
+from .compat import ob, typed_state
+from .positions import bounds_of, positions_of
 
 
 class HeatmapStateSampler(ob.StateSampler):  # type: ignore[misc]
@@ -40,9 +40,9 @@ class HeatmapStateSampler(ob.StateSampler):  # type: ignore[misc]
         stream: DrawStream | None = None,
     ) -> None:
         super().__init__(space)
-        self._space = space
         self._stream = stream or DrawStream(heatmap, uniform_fraction, seed)
         self._positions = positions_of(space, self._stream.rng)
+        self._stream.keep_inside(*bounds_of(space))
 
     @property
     def draws(self) -> dict[str, int]:
@@ -51,19 +51,17 @@ class HeatmapStateSampler(ob.StateSampler):  # type: ignore[misc]
 
     def sampleUniform(self, state: Any) -> None:  # noqa: N802
         """Draw from the heat map mixed with uniform: what planners take for "uniform"."""
-        self._positions.write(state, *self._stream.next())
+        self._positions.write(typed_state(state), *self._stream.next())
 
     def sampleUniformNear(self, state: Any, near: Any, distance: float) -> None:  # noqa: N802
         """Draw from the heat map inside the box of half width ``distance`` around ``near``."""
-        x, y = self._positions.read(near)
-        self._positions.write(state, *self._stream.near(x, y, distance))
-        self._space.enforceBounds(state)
+        x, y = self._positions.read(typed_state(near))
+        self._positions.write(typed_state(state), *self._stream.near(x, y, distance))
 
     def sampleGaussian(self, state: Any, mean: Any, std_dev: float) -> None:  # noqa: N802
         """Draw from the product of the heat map and a Gaussian around ``mean``."""
-        x, y = self._positions.read(mean)
-        self._positions.write(state, *self._stream.gaussian(x, y, std_dev))
-        self._space.enforceBounds(state)
+        x, y = self._positions.read(typed_state(mean))
+        self._positions.write(typed_state(state), *self._stream.gaussian(x, y, std_dev))
 
 
 class HeatmapValidStateSampler(ob.ValidStateSampler):  # type: ignore[misc]
@@ -96,9 +94,10 @@ class HeatmapValidStateSampler(ob.ValidStateSampler):  # type: ignore[misc]
     ) -> None:
         super().__init__(si)
         self._si = si
-        self._space = si.getStateSpace()
         self._stream = stream or DrawStream(heatmap, uniform_fraction, seed)
-        self._positions = positions_of(self._space, self._stream.rng)
+        space = si.getStateSpace()
+        self._positions = positions_of(space, self._stream.rng)
+        self._stream.keep_inside(*bounds_of(space))
 
     @property
     def draws(self) -> dict[str, int]:
@@ -111,14 +110,14 @@ class HeatmapValidStateSampler(ob.ValidStateSampler):  # type: ignore[misc]
 
     def sampleNear(self, state: Any, near: Any, distance: float) -> bool:  # noqa: N802
         """Draw a valid state in the box of half width ``distance`` around ``near``."""
-        x, y = self._positions.read(near)
+        x, y = self._positions.read(typed_state(near))
         return self._first_valid(state, lambda: self._stream.near(x, y, distance))
 
     def _first_valid(self, state: Any, draw: Callable[[], tuple[float, float]]) -> bool:
+        typed = typed_state(state)
         for _ in range(self.getNrAttempts()):
-            self._positions.write(state, *draw())
-            self._space.enforceBounds(state)
-            if self._si.isValid(state):
+            self._positions.write(typed, *draw())
+            if self._si.isValid(typed):
                 return True
         return False
 

@@ -1,0 +1,104 @@
+"""A task on a map as OMPL sees it, and the check of what OMPL gives back."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ConfigError
+from ..gridmap import GridMap
+from . import compat
+from .compat import og
+from .validity import GridMotionValidator, GridValidityChecker
+
+#: Start and goal, as from :meth:`GridMap.check_task`.
+Ends = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+_LEAST_THRESHOLD = float(np.finfo(np.float64).eps)
+
+# Setters of every planner that set no parameter.
+_NO_PARAMETERS = frozenset(
+    {"setName", "setOptimizationObjective", "setProblemDefinition", "settings", "setup"}
+)
+
+# Slack of the check that a path ends in the goal region, for the rounding of a distance.
+_ROUNDING = 1e-9
+
+
+def simple_setup(grid: GridMap, task: Ends, tolerance: float) -> Any:
+    """A SimpleSetup with exact checks, start and goal, but no planner.
+
+    Args:
+        grid: the map.
+        task: start and goal, as from :meth:`GridMap.check_task`.
+        tolerance: how far from the goal a path may end, world units.
+    """
+    space = compat.plane_space(*grid.bounds)
+    setup = og.SimpleSetup(space)
+    si = setup.getSpaceInformation()
+    setup.setStateValidityChecker(GridValidityChecker(si, grid))
+    si.setMotionValidator(GridMotionValidator(si, grid))
+    start, goal = compat.new_state(space), compat.new_state(space)
+    for state, point in ((start, task[0]), (goal, task[1])):
+        state[0], state[1] = float(point[0]), float(point[1])
+    # A goal is reached at less than its threshold; OMPL's own default is the least one as well.
+    setup.setStartAndGoalStates(start, goal, max(float(tolerance), _LEAST_THRESHOLD))
+    return setup
+
+
+def set_range(planner: Any, range: float) -> bool:
+    """Set the longest edge of a planner, world units; False where it has no such parameter."""
+    has_range = hasattr(planner, "setRange")
+    if has_range:
+        planner.setRange(float(range))
+    return has_range
+
+
+def set_parameter(planner: Any, name: str, value: bool | float | str) -> None:
+    """Set a parameter of a planner by the name of its setter.
+
+    Args:
+        planner: an OMPL planner.
+        name: in lower case with underscores: ``rewire_factor`` calls ``setRewireFactor``,
+            ``delay_cc`` calls ``setDelayCC``.
+        value: what the setter is called with.
+
+    Raises:
+        ConfigError: the planner has no such setter, or the setter refuses the value.
+    """
+    setters = {
+        setter.removeprefix("set").lower(): setter
+        for setter in sorted(set(dir(planner)) - _NO_PARAMETERS)
+        if setter.startswith("set")
+    }
+    kind = type(planner).__name__
+    wanted = name.replace("_", "")
+    if wanted not in setters:
+        raise ConfigError(
+            f"{kind} has no parameter {name!r} to set; its setters are "
+            f"{', '.join(setters.values())}"
+        )
+    try:
+        getattr(planner, setters[wanted])(value)
+    # Boost.Python's ArgumentError is a TypeError.
+    except TypeError as error:
+        raise ConfigError(
+            f"{kind}.{setters[wanted]} does not take {value!r} ({type(value).__name__})"
+        ) from error
+
+
+def checked_path(
+    setup: Any, grid: GridMap, task: Ends, tolerance: float
+) -> NDArray[np.float64] | None:
+    """The path that a setup has, or None when it is no path of the task after all."""
+    path = compat.path_positions(setup.getSolutionPath())
+    starts = np.array_equal(path[0], task[0])
+    ends = np.hypot(*(path[-1] - task[1])) <= tolerance + _ROUNDING
+    return path if starts and ends and grid.path_is_free(path) else None
+
+
+def path_length(path: NDArray[np.float64]) -> float:
+    """Length of a path, (N, 2)."""
+    return float(np.hypot(*np.diff(path, axis=0).T).sum())
