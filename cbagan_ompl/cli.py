@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from . import __version__
+from .benchmarking.cli import add_benchmark_parser
 from .draws import DEFAULT_UNIFORM_FRACTION
 from .errors import CbaganOmplError, ConfigError
 from .gridmap import GridMap
@@ -74,6 +75,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"cbagan-ompl {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     _add_plan_parser(commands)
+    add_benchmark_parser(commands)
     add_train_parser(commands)
     add_export_parser(commands)
     return parser

@@ -1,5 +1,11 @@
 from __future__ import annotations
 
+import os
+
+# Before torch is loaded: on small tensors several threads mostly wait for each other, and on a
+# busy machine for minutes.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 import numpy as np
 import pytest
 

@@ -1,0 +1,66 @@
+"""What the benchmark runner costs: iterations of RRT* inside and outside of it.
+
+    python benchmarks/overhead.py
+
+The same task, time limit and parameters, once by a plain SimpleSetup and once by the runner, with
+its counting of collision checks, its look at the best cost and OMPL's progress data. The two take
+turns, and the plain one runs as long as the other one did: OMPL's Benchmark looks at the clock now
+and then only, and iterations become slower as the tree grows.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+import numpy as np
+from tqdm import trange
+
+from cbagan_ompl import GridMap, tasks_of
+from cbagan_ompl.benchmarking.logs import parse_log
+from cbagan_ompl.planning import compat
+from cbagan_ompl.planning.benchmark import Entrant, RunOptions, run_benchmark
+from cbagan_ompl.planning.compat import og, ou
+from cbagan_ompl.planning.problem import Ends, simple_setup
+
+MAP, RANGE = "bundled:walls_with_gaps", 20.0
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--rounds", type=int, default=15, help="runs of each (default: 15)")
+    parser.add_argument("--time", type=float, default=1.0, help="seconds of a run (default: 1)")
+    args = parser.parse_args()
+    grid = GridMap.load(MAP)
+    first = tasks_of(MAP, grid)[0]
+    task = grid.check_task(first.start, first.goal)
+    ratios, rates = [], []
+    for seed in trange(args.rounds):
+        iterations, seconds = inside(grid, task, args.time, seed)
+        ratios.append(iterations / outside(grid, task, seconds, seed))
+        rates.append(iterations / seconds)
+    print(
+        f"OMPL {compat.ompl_version()}: {np.median(rates):.0f} iterations per second inside, "
+        f"{np.median(ratios):.3f} of those outside ({np.min(ratios):.3f} to {np.max(ratios):.3f})"
+    )
+
+
+def inside(grid: GridMap, task: Ends, time: float, seed: int) -> tuple[int, float]:
+    options = RunOptions(1, time, RANGE, grid.resolution, seed=seed)
+    recording = run_benchmark("x", grid, task, [Entrant("RRTstar", "uniform", None)], options)
+    run = parse_log(recording.logs[0]).planners[0].runs[0]
+    return int(run["iterations INTEGER"]), float(run["time REAL"])
+
+
+def outside(grid: GridMap, task: Ends, time: float, seed: int) -> int:
+    with compat.log_level(ou.LOG_ERROR):
+        compat.seed_ompl(seed)
+        setup = simple_setup(grid, task, grid.resolution)
+        planner = og.RRTstar(setup.getSpaceInformation())
+        planner.setRange(RANGE)
+        setup.setPlanner(planner)
+        setup.solve(time)
+        return int(planner.numIterations())
+
+
+if __name__ == "__main__":
+    main()

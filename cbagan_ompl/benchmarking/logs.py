@@ -1,0 +1,246 @@
+"""OMPL's benchmark logs: reading, joining, adding to and writing them.
+
+The format is that of OMPL's documentation of Benchmark. What is not understood of it is kept.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import chain
+from math import inf, isfinite
+
+from ..errors import ConfigError
+
+_BLOCK_BEGIN, _BLOCK_END = "<<<|", "|>>>"
+
+#: The name by which OMPL's logs call a geometric planner begins with this.
+GEOMETRIC = "geometric_"
+
+
+@dataclass(frozen=True)
+class PlannerLog:
+    """The runs of one planner.
+
+    Attributes:
+        name: what the planner is called.
+        settings: lines ``parameter = value``.
+        runs: for each run its properties, ``"graph states INTEGER"`` -> text; a property that a
+            run lacks is missing or empty.
+        progress: for each run its points in time, each a property -> text; empty where the
+            planner has none.
+    """
+
+    name: str
+    settings: tuple[str, ...]
+    runs: tuple[Mapping[str, str], ...]
+    progress: tuple[tuple[Mapping[str, str], ...], ...] = ()
+
+
+@dataclass(frozen=True)
+class ExperimentLog:
+    """One log.
+
+    Attributes:
+        version: ``"OMPL version 2.0.1"``.
+        name: of the experiment, without blanks.
+        parameters: of the experiment, ``"map VARCHAR"`` -> text.
+        host: name of the machine.
+        date: when it began.
+        setup: OMPL's description of the problem.
+        cpu: OMPL's description of the machine, empty where it has none.
+        seed: of OMPL's generators.
+        time_limit: seconds of a run.
+        memory_limit: megabytes of a run.
+        runs: of each planner.
+        total_time: seconds.
+        enums: name and values of each enumeration.
+        planners: in the order in which they ran.
+    """
+
+    version: str
+    name: str
+    parameters: Mapping[str, str]
+    host: str
+    date: str
+    setup: str
+    cpu: str
+    seed: str
+    time_limit: float
+    memory_limit: float
+    runs: int
+    total_time: float
+    enums: tuple[tuple[str, ...], ...]
+    planners: tuple[PlannerLog, ...] = field(repr=False)
+
+
+def parse_log(text: str) -> ExperimentLog:
+    """Read a log that OMPL's ``Benchmark.saveResultsToFile`` or :func:`format_log` wrote.
+
+    Raises:
+        ConfigError: the text is no such log, or not a whole one.
+    """
+    lines = _Lines(text)
+    try:
+        return ExperimentLog(
+            version=lines.match(r"(\S+ version .*)"),
+            name=lines.match(r"Experiment (.*)"),
+            parameters=dict(
+                line.split(" = ", 1) for line in lines.several(r"(\d+) experiment properties", "0")
+            ),
+            host=lines.match(r"Running on (.*)"),
+            date=lines.match(r"Starting at (.*)"),
+            setup=lines.block(),
+            cpu=lines.block(),
+            seed=lines.match(r"(\d+) is the random seed"),
+            time_limit=float(lines.match(r"(\S+) seconds per run")),
+            memory_limit=float(lines.match(r"(\S+) MB per run")),
+            runs=int(lines.match(r"(\d+) runs per planner")),
+            total_time=float(lines.match(r"(\S+) seconds spent to collect the data")),
+            enums=tuple(
+                tuple(line.split("|")) for line in lines.several(r"(\d+) enum types?", "0")
+            ),
+            planners=tuple(
+                _parse_planner(lines) for _ in range(int(lines.match(r"(\d+) planners")))
+            ),
+        )
+    except ValueError as error:
+        raise ConfigError(
+            f"no benchmark log of OMPL, or one that is cut off (line {lines.number}): {error}"
+        ) from error
+
+
+class _Lines:
+    """The lines of a log, one after the other."""
+
+    def __init__(self, text: str) -> None:
+        self._lines = text.splitlines()
+        self.number = 0
+
+    def next(self) -> str:
+        if self.number == len(self._lines):
+            raise ValueError("the text ends here")
+        self.number += 1
+        return self._lines[self.number - 1]
+
+    def match(self, pattern: str, default: str | None = None) -> str:
+        """What the group of the pattern matches in the next line, or ``default`` without it."""
+        found = re.fullmatch(pattern, self.next())
+        if found:
+            return found[1]
+        self.number -= 1
+        if default is None:
+            raise ValueError(f"expected {pattern!r}")
+        return default
+
+    def block(self) -> str:
+        """The text of an optional block of lines."""
+        if not self.match(f"({re.escape(_BLOCK_BEGIN)})", ""):
+            return ""
+        return "\n".join(iter(self.next, _BLOCK_END))
+
+    def several(self, count_pattern: str, default: str | None = None) -> tuple[str, ...]:
+        """As many lines as the next line says."""
+        return tuple(self.next() for _ in range(int(self.match(count_pattern, default))))
+
+
+def _parse_planner(lines: _Lines) -> PlannerLog:
+    name = lines.next()
+    settings = lines.several(r"(\d+) common properties")
+    properties = lines.several(r"(\d+) properties for each run")
+    runs = tuple(
+        dict(zip(properties, row.split("; "), strict=False)) for row in lines.several(r"(\d+) runs")
+    )
+    progress: tuple[tuple[dict[str, str], ...], ...] = ()
+    progress_properties = lines.several(r"(\d+) progress properties for each run", "0")
+    if progress_properties:
+        progress = tuple(
+            tuple(
+                dict(zip(progress_properties, point.split(","), strict=False))
+                for point in row.split(";")[:-1]
+            )
+            for row in lines.several(r"(\d+) runs")
+        )
+    lines.match(r"(\.)")
+    return PlannerLog(name, settings, runs, progress)
+
+
+def join_logs(logs: Sequence[ExperimentLog]) -> ExperimentLog:
+    """The log that OMPL would have written had it done the runs of several logs in one go.
+
+    Args:
+        logs: of the same problem with the same planners, in the order of the runs.
+    """
+    first = logs[0]
+    return replace(
+        first,
+        runs=sum(log.runs for log in logs),
+        total_time=sum(log.total_time for log in logs),
+        planners=tuple(
+            replace(
+                parts[0],
+                runs=tuple(chain.from_iterable(part.runs for part in parts)),
+                progress=tuple(chain.from_iterable(part.progress for part in parts)),
+            )
+            for parts in zip(*(log.planners for log in logs), strict=True)
+        ),
+    )
+
+
+def format_log(log: ExperimentLog) -> str:
+    """The text of a log, as OMPL writes it."""
+    lines = [
+        log.version,
+        f"Experiment {log.name}",
+        f"{len(log.parameters)} experiment properties",
+        *(f"{name} = {value}" for name, value in log.parameters.items()),
+        f"Running on {log.host}",
+        f"Starting at {log.date}",
+        *(_BLOCK_BEGIN, log.setup, _BLOCK_END),
+        *((_BLOCK_BEGIN, log.cpu, _BLOCK_END) if log.cpu else ()),
+        f"{log.seed} is the random seed",
+        f"{log.time_limit:g} seconds per run",
+        f"{log.memory_limit:g} MB per run",
+        f"{log.runs} runs per planner",
+        f"{log.total_time:g} seconds spent to collect the data",
+        f"{len(log.enums)} enum type{'' if len(log.enums) == 1 else 's'}",
+        *("|".join(enum) for enum in log.enums),
+        f"{len(log.planners)} planners",
+        *chain.from_iterable(_planner_lines(planner) for planner in log.planners),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _planner_lines(planner: PlannerLog) -> Iterator[str]:
+    properties = properties_of(planner.runs)
+    yield planner.name
+    yield f"{len(planner.settings)} common properties"
+    yield from planner.settings
+    yield f"{len(properties)} properties for each run"
+    yield from properties
+    yield f"{len(planner.runs)} runs"
+    for run in planner.runs:
+        yield "".join(f"{run.get(name, '')}; " for name in properties)
+    progress_properties = properties_of(chain.from_iterable(planner.progress))
+    if progress_properties:
+        yield f"{len(progress_properties)} progress properties for each run"
+        yield from progress_properties
+        yield f"{len(planner.progress)} runs"
+        for points in planner.progress:
+            yield "".join(
+                "".join(f"{point.get(name, '')}," for name in progress_properties) + ";"
+                for point in points
+            )
+    yield "."
+
+
+def properties_of(rows: Iterable[Mapping[str, str]]) -> list[str]:
+    """Names of all properties of some runs or points, sorted."""
+    return sorted(set(chain.from_iterable(rows)))
+
+
+def number(text: str | None) -> float | None:
+    """A finite number of a log, None where it has none."""
+    value = float(text) if text else inf
+    return value if isfinite(value) else None

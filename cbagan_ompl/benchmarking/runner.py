@@ -1,0 +1,121 @@
+"""Running the tasks of a benchmark, each in a process of its own."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from multiprocessing import get_context
+from multiprocessing.connection import Connection, wait
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import cast
+
+from tqdm import tqdm
+
+from .worker import Job, run_job
+
+# Imported once, by the server that the processes are forked from.
+_PRELOAD = ("cbagan_ompl.benchmarking.worker",)
+# Brings torch, which takes seconds.
+_PRELOAD_LEARNED = ("cbagan_ompl.network.predictor",)
+
+# Characters of the end of a crashed process' output.
+_LAST_WORDS = 4000
+
+
+def run_jobs(jobs: Sequence[Job], processes: int, show_progress: bool = True) -> dict[str, str]:
+    """Run jobs, several at a time; a crash of one, even an abort, leaves the others alone.
+
+    Args:
+        jobs: the tasks.
+        processes: how many run at a time.
+        show_progress: draw a progress bar with the time left.
+
+    Returns:
+        For each task that failed, by its name, the end of what it said.
+
+    Raises:
+        KeyboardInterrupt: after an interrupt; the tasks that were running are given up.
+    """
+    waiting = list(reversed(jobs))
+    running: dict[Connection, _Running] = {}
+    failures: dict[str, str] = {}
+    rounds = sum(job.settings.runs for job in jobs)
+    bar = tqdm(total=rounds, unit="round", disable=not show_progress, dynamic_ncols=True)
+    with bar, TemporaryDirectory() as folder:
+        try:
+            while waiting or running:
+                while waiting and len(running) < processes:
+                    started = _Running(waiting.pop(), Path(folder))
+                    running[started.rounds] = started
+                for ready in cast("list[Connection]", wait(list(running))):
+                    done = running[ready].rounds_done()
+                    bar.update(done)
+                    if done == 0:
+                        _end(running.pop(ready), failures, bar)
+        finally:
+            for given_up in running.values():
+                given_up.process.terminate()
+                given_up.last_words()
+    return failures
+
+
+def _end(ended: _Running, failures: dict[str, str], bar: tqdm[None]) -> None:
+    name = ended.job.task.name
+    words = ended.last_words()
+    bar.update(ended.rounds_left)
+    if words:
+        failures[name] = words
+        bar.write(f"task {name} failed: {words.splitlines()[-1]}", sys.stderr)
+
+
+class _Running:
+    """A job in its process.
+
+    Attributes:
+        rounds: has something to read after each round of runs, and when the process is over.
+    """
+
+    def __init__(self, job: Job, folder: Path) -> None:
+        context = get_context("forkserver")
+        learned = "learned" in job.settings.samplers
+        context.set_forkserver_preload([*_PRELOAD, *(_PRELOAD_LEARNED if learned else ())])
+        self.job = job
+        self.rounds_left = job.settings.runs
+        self._output = folder / job.task.name
+        self._output.touch()
+        self.rounds, writer = context.Pipe(duplex=False)
+        self.process = context.Process(target=_work, args=(job, writer, self._output), daemon=True)
+        self.process.start()
+        writer.close()  # the process has its own copy: with that one the pipe ends
+
+    def rounds_done(self) -> int:
+        """One when a round is done, none when the process is over."""
+        try:
+            self.rounds.recv_bytes()
+        except EOFError:
+            return 0
+        self.rounds_left -= 1
+        return 1
+
+    def last_words(self) -> str:
+        """Wait for the end; what a process that failed has said, empty for one that did not."""
+        self.process.join()
+        self.rounds.close()
+        code = self.process.exitcode
+        if not code:
+            return ""
+        output = self._output.read_text(encoding="utf-8", errors="replace")
+        end = f"ended by {signal.Signals(-code).name}" if code < 0 else ""
+        return f"{output[-_LAST_WORDS:]}\n{end}".strip() or f"exit status {code}"
+
+
+def _work(job: Job, rounds: Connection, output: Path) -> None:
+    """What the process does; a traceback goes to its output as well."""
+    os.setsid()  # an interrupt from the terminal is for the parent alone
+    with output.open("wb") as file:
+        for stream in (1, 2):
+            os.dup2(file.fileno(), stream)
+    run_job(job, lambda: rounds.send_bytes(b"."))

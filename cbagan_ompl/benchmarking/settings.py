@@ -1,0 +1,100 @@
+"""What a benchmark compares: one value for all tasks of it, kept beside their results."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from ..draws import DEFAULT_UNIFORM_FRACTION
+from ..errors import ConfigError
+
+#: OMPL's own sampler, which the others are compared with.
+BASELINE = "uniform"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Options of a benchmark.
+
+    Attributes:
+        planners: OMPL's names.
+        samplers: of :data:`cbagan_ompl.planning.plan.SAMPLERS`, and the keys of ``heatmap_dirs``.
+        runs: of each planner with each sampler on each task.
+        time: limit of a run, seconds.
+        range: longest edge of the planners that have this parameter, world units; by default
+            OMPL's choice (a fifth of the map's diagonal).
+        parameters: for some planners ``{parameter: value}``.
+        uniform_fraction: share of draws that stays uniform over free space, in (0, 1].
+        model: file of the learned sampler's model; the bundled one by default.
+        heatmap_dirs: for some samplers the folder of their heat maps, one for each task.
+        radius: of the robot, world units.
+        seed: at least 0.
+
+    Raises:
+        ConfigError: an option that makes no sense.
+    """
+
+    planners: tuple[str, ...] = ("RRT", "RRTstar", "InformedRRTstar")
+    samplers: tuple[str, ...] = (BASELINE, "learned", "corridor")
+    runs: int = 5
+    time: float = 0.4
+    range: float | None = None
+    parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    uniform_fraction: float = DEFAULT_UNIFORM_FRACTION
+    model: str | None = None
+    heatmap_dirs: Mapping[str, str] = field(default_factory=dict)
+    radius: float = 0.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for what, names in (("planners", self.planners), ("samplers", self.samplers)):
+            if not names or len(set(names)) < len(names):
+                raise ConfigError(f"{what} must be named, and each once, got {', '.join(names)!r}")
+        if self.runs < 1:
+            raise ConfigError(f"runs must be at least 1, got {self.runs}")
+        for name, value in (("time", self.time), ("range", self.range)):
+            if value is not None and not (isfinite(value) and value > 0):
+                raise ConfigError(f"{name} must be above 0, got {value}")
+        if not 0 < self.uniform_fraction <= 1:
+            raise ConfigError(
+                f"uniform_fraction is a share above 0 and up to 1, got {self.uniform_fraction}"
+            )
+        if self.seed < 0:
+            raise ConfigError(f"seed must be at least 0, got {self.seed}")
+        for planner in self.parameters:
+            if planner not in self.planners:
+                raise ConfigError(
+                    f"a parameter of {planner} is set, which is not among the planners "
+                    f"{', '.join(self.planners)}"
+                )
+
+    def save(self, path: Path) -> None:
+        """Write the settings as JSON."""
+        path.write_text(json.dumps(asdict(self), indent=2) + "\n", encoding="utf-8")
+
+    def is_saved_in(self, path: Path) -> bool:
+        """Whether a file that :meth:`save` wrote holds the same settings."""
+        saved = json.loads(path.read_text(encoding="utf-8"))
+        return bool(saved == json.loads(json.dumps(asdict(self))))
+
+
+def parse_parameters(assignments: list[str]) -> dict[str, dict[str, Any]]:
+    """Parameters of planners from texts such as ``RRTstar.rewire_factor=1.2``.
+
+    Raises:
+        ConfigError: a text of another form.
+    """
+    parameters: dict[str, dict[str, Any]] = {}
+    for assignment in assignments:
+        key, equals, text = assignment.partition("=")
+        planner, dot, name = key.partition(".")
+        if not (planner and dot and name and equals):
+            raise ConfigError(f"expected PLANNER.parameter=value, got {assignment!r}")
+        parameters.setdefault(planner, {})[name] = yaml.safe_load(text)
+    return parameters
