@@ -130,7 +130,7 @@ def _decode_pgm(data: bytes, name: str) -> Picture:
     """
     gap = rb"(?:\s|#[^\n]*\n)+"
     header = re.match(
-        rb"P([25])" + gap + rb"(\d{1,9})" + gap + rb"(\d{1,9})" + gap + rb"(\d{1,9})\s", data
+        rb"P([25])" + gap + rb"(\d{1,99})" + gap + rb"(\d{1,99})" + gap + rb"(\d{1,99})\s", data
     )
     if header is None:
         raise MapError(
