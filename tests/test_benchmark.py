@@ -9,6 +9,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -206,6 +207,15 @@ def test_resume_runs_only_what_is_missing(
     assert "other options" in capsys.readouterr().err
 
 
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """A process that was started in the background ignores SIGINT, and so do its children."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 def test_interrupt_keeps_finished_tasks(map_folder: Path, tmp_path: Path) -> None:
     folder = tmp_path / "out"
     arguments = ["benchmark", str(map_folder / "walls.png"), "--tasks-per-map", "12", "--runs", "2"]
@@ -265,6 +275,7 @@ def test_errors_in_events_come_out(two_walls: GridMap, corridor: Heatmap) -> Non
     assert time.monotonic() - began < 4
 
 
+@pytest.mark.usefixtures("interruptible")
 def test_interrupt_of_a_benchmark_in_this_process(two_walls: GridMap, corridor: Heatmap) -> None:
     task = two_walls.check_task((10, 10), (240, 240))
     entrants = [Entrant("RRTstar", "corridor", lambda *_: corridor)]
