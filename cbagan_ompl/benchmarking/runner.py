@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
@@ -48,8 +49,9 @@ def run_jobs(jobs: Sequence[Job], processes: int, show_progress: bool = True) ->
         try:
             while waiting or running:
                 while waiting and len(running) < processes:
-                    started = _Running(waiting.pop(), Path(folder))
-                    running[started.rounds] = started
+                    with _interrupts_held():
+                        started = _Running(waiting.pop(), Path(folder))
+                        running[started.rounds] = started
                 for ready in cast("list[Connection]", wait(list(running))):
                     done = running[ready].rounds_done()
                     bar.update(done)
@@ -60,6 +62,16 @@ def run_jobs(jobs: Sequence[Job], processes: int, show_progress: bool = True) ->
                 given_up.process.terminate()
                 given_up.last_words()
     return failures
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """An interrupt comes after the block: a process that has started is a process that we know."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _end(ended: _Running, failures: dict[str, str], bar: tqdm[None]) -> None:
