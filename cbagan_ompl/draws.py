@@ -92,10 +92,6 @@ class DrawStream:
         """Draws handed out so far: ``{"learned": n, "uniform": m}``."""
         return {"learned": self.learned, "uniform": self.uniform}
 
-    def reset_counts(self) -> None:
-        """Start counting at 0 again."""
-        self.learned = self.uniform = 0
-
     def keep_inside(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> None:
         """Draw only inside a box, such as the bounds of a state space.
 

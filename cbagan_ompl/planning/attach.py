@@ -43,10 +43,6 @@ class Attachment:
         """Draws that the planner has had so far: ``{"learned": n, "uniform": m}``."""
         return self._stream.draws
 
-    def reset_counts(self) -> None:
-        """Start counting draws at 0 again."""
-        self._stream.reset_counts()
-
     def detach(self) -> None:
         """Give the planner back as it was before.
 
