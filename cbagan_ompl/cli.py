@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 from collections.abc import Sequence
@@ -14,6 +13,7 @@ from . import __version__
 from .benchmarking.cli import add_benchmark_parser
 from .draws import DEFAULT_UNIFORM_FRACTION
 from .errors import CbaganOmplError, ConfigError
+from .files import write_json
 from .gridmap import GridMap
 from .heatmap import Heatmap
 from .mapfiles import bundled_maps
@@ -200,7 +200,7 @@ def _plan(args: argparse.Namespace) -> int:
     )
     values = result.to_dict()
     if args.json is not None:
-        _write_json(args.json, values)
+        write_json(args.json, values)
     if args.output is not None:
         save_picture(result, grid, args.output)
     _print_summary(values, args.output)
@@ -248,13 +248,6 @@ def _print_summary(values: dict[str, Any], picture: str | None) -> None:
 def _why(values: dict[str, Any]) -> str:
     exact = values["status"] == "Exact solution"
     return "its path failed the check" if exact else values["status"]
-
-
-def _write_json(path: str, values: dict[str, Any]) -> None:
-    try:
-        Path(path).write_text(json.dumps(values, indent=2) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise ConfigError(f"cannot write {path}: {error.strerror or error}") from error
 
 
 if __name__ == "__main__":

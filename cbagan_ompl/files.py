@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import Any
 
-from .errors import MapError
+from .errors import ConfigError, MapError
 
 
 def read_bytes(path: Path) -> bytes:
@@ -31,3 +33,15 @@ def read_text(path: Path) -> str:
         return read_bytes(path).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise MapError(f"{path} is no text file in UTF-8: {error}") from error
+
+
+def write_json(path: str, values: dict[str, Any]) -> None:
+    """Write values as indented JSON.
+
+    Raises:
+        ConfigError: the file cannot be written.
+    """
+    try:
+        Path(path).write_text(json.dumps(values, indent=2) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"cannot write {path}: {error.strerror or error}") from error

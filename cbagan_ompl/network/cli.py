@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
-from pathlib import Path
 from typing import Any
 
 import yaml
 
 from ..errors import ConfigError
+from ..files import write_json
 from . import require_torch
 from .config import PRESETS, TrainingConfig
 
@@ -139,7 +138,8 @@ def _train(args: argparse.Namespace) -> int:
             f"connectivity {scores['connectivity']:.1%}"
         )
     print(f"export it with: cbagan-ompl export {result['checkpoint']} --output MODEL.pt")
-    _write_json(args.json, result)
+    if args.json is not None:
+        write_json(args.json, result)
     return 0
 
 
@@ -154,14 +154,6 @@ def _export(args: argparse.Namespace) -> int:
     )
     if record["metrics"]["test"] is None:
         print("the training run has not come to its end: the card has validation scores only")
-    _write_json(args.json, record)
+    if args.json is not None:
+        write_json(args.json, record)
     return 0
-
-
-def _write_json(path: str | None, content: dict[str, Any]) -> None:
-    if path is None:
-        return
-    try:
-        Path(path).write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise ConfigError(f"cannot write {path}: {error.strerror or error}") from error

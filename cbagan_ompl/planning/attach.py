@@ -98,7 +98,8 @@ def attach(
     """
     planner = setup.getPlanner()
     _check_attachable(setup, planner)
-    hook = hook_of(_class_name(planner))
+    name = _class_name(planner)
+    hook = hook_of(name)
     stream = DrawStream(heatmap, uniform_fraction, seed)
     space = setup.getStateSpace()
     positions = positions_of(space, stream.rng)
@@ -109,7 +110,7 @@ def attach(
     progress = PlannerProgress(setup, positions)
     if _is_informed(planner):
         stream.follow(progress.path_length, progress.informed_set)
-    undo_hook = _INSTALL[hook](_Parts(setup, planner, positions, stream, progress))
+    undo_hook = _INSTALL[hook](_Parts(setup, planner, name, positions, stream, progress))
 
     def undo() -> None:
         progress.release()
@@ -154,6 +155,7 @@ class _Parts:
 
     setup: Any
     planner: Any
+    name: str
     positions: Positions
     stream: DrawStream
     progress: PlannerProgress
@@ -161,10 +163,10 @@ class _Parts:
 
 def _use_state_sampler(parts: _Parts) -> Callable[[], None]:
     space, stream = parts.setup.getStateSpace(), parts.stream
-    planner, name = parts.planner, _class_name(parts.planner)
+    planner = parts.planner
     space.setStateSamplerAllocator(samplers.state_sampler_allocator(stream.heatmap, stream=stream))
     restore = _reject_uninformed(planner) if _is_informed(planner) else None
-    keeps_sampler = name in KEEP_SAMPLER
+    keeps_sampler = parts.name in KEEP_SAMPLER
     if keeps_sampler:
         _renew_sampler(planner)
 
