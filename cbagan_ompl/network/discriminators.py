@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from .attention import AttentionBlock
+from .attention import CBAM, Attention, AttentionBlock
 
 
 class Discriminator(nn.Module):
@@ -17,21 +17,17 @@ class Discriminator(nn.Module):
 
     Args:
         width: channels of each input after the first convolution; 32 in the paper.
-        channel_attention: see :class:`AttentionBlock`.
-        spatial_attention: see :class:`AttentionBlock`.
+        attention: see :class:`AttentionBlock`; self-attention only in the body.
     """
 
-    def __init__(
-        self, width: int = 32, channel_attention: bool = True, spatial_attention: bool = True
-    ) -> None:
+    def __init__(self, width: int = 32, attention: Attention = CBAM) -> None:
         super().__init__()
-        attention = (channel_attention, spatial_attention)
-        self.condition_stem = _stem(width, *attention)
-        self.region_stem = _stem(width, *attention)
+        self.condition_stem = _stem(width, attention.without_self_attention())
+        self.region_stem = _stem(width, attention.without_self_attention())
         self.body = nn.Sequential(
             *_down(2 * width, 4 * width),
             *_down(4 * width, 8 * width),
-            AttentionBlock(8 * width, *attention),
+            AttentionBlock(8 * width, attention),
             nn.Conv2d(8 * width, 2 * width, 1),
             nn.LeakyReLU(0.2, inplace=True),
             nn.Conv2d(2 * width, 1, 2),
@@ -49,11 +45,11 @@ class Discriminator(nn.Module):
         return logits
 
 
-def _stem(width: int, channel_attention: bool, spatial_attention: bool) -> nn.Sequential:
+def _stem(width: int, attention: Attention) -> nn.Sequential:
     return nn.Sequential(
         nn.Conv2d(3, width, 4, stride=2, padding=1),
         nn.LeakyReLU(0.2, inplace=True),
-        AttentionBlock(width, channel_attention, spatial_attention),
+        AttentionBlock(width, attention),
     )
 
 

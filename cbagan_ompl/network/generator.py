@@ -8,7 +8,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from .attention import AttentionBlock
+from .attention import CBAM, Attention, AttentionBlock
 
 #: The generator halves its input this many times; height and width are multiples of 2 to it.
 STAGES = 4
@@ -25,8 +25,7 @@ class ResidualBlock(nn.Module):
         in_channels: channels of the input.
         out_channels: channels of the output.
         stride: 2 halves height and width in the first convolution, 1 keeps them.
-        channel_attention: see :class:`AttentionBlock`.
-        spatial_attention: see :class:`AttentionBlock`.
+        attention: see :class:`AttentionBlock`.
     """
 
     def __init__(
@@ -34,8 +33,7 @@ class ResidualBlock(nn.Module):
         in_channels: int,
         out_channels: int,
         stride: int,
-        channel_attention: bool,
-        spatial_attention: bool,
+        attention: Attention,
     ) -> None:
         super().__init__()
         self.body = nn.Sequential(
@@ -44,7 +42,7 @@ class ResidualBlock(nn.Module):
             nn.ReLU(inplace=True),
             nn.Conv2d(out_channels, out_channels, 3, padding=1, bias=False),
             nn.BatchNorm2d(out_channels),
-            AttentionBlock(out_channels, channel_attention, spatial_attention),
+            AttentionBlock(out_channels, attention),
         )
         self.shortcut: nn.Module = nn.Identity()
         if stride != 1 or in_channels != out_channels:
@@ -69,22 +67,18 @@ class UpBlock(nn.Module):
     Args:
         in_channels: channels of the coarse features.
         out_channels: channels of the output, and of the skip.
-        channel_attention: see :class:`AttentionBlock`.
-        spatial_attention: see :class:`AttentionBlock`.
+        attention: see :class:`AttentionBlock`.
     """
 
     def __init__(
         self,
         in_channels: int,
         out_channels: int,
-        channel_attention: bool,
-        spatial_attention: bool,
+        attention: Attention,
     ) -> None:
         super().__init__()
         self.project = nn.Conv2d(in_channels, out_channels, 1)
-        self.block = ResidualBlock(
-            out_channels, out_channels, 1, channel_attention, spatial_attention
-        )
+        self.block = ResidualBlock(out_channels, out_channels, 1, attention)
 
     def forward(self, features: Tensor, skip: Tensor) -> Tensor:
         """(B, C_in, H, W) and (B, C_out, 2 H, 2 W) -> (B, C_out, 2 H, 2 W)."""
@@ -103,34 +97,33 @@ class Generator(nn.Module):
       time; the last stage runs at full size with the 16 channels of a stem;
     * additive skips between stages of equal size, so that walls stay sharp;
     * batch norm in every residual block, and at the end of it the attention block that the paper
-      draws for the discriminators; only the last stage has none, where it would cost most.
+      draws for the discriminators; only the last stage has none, where it would cost most;
+    * self-attention, for SAGAN, where the features have a quarter of the side or less.
 
     Args:
         widths: channels after each of the four stages on the way down; the way up mirrors them.
-        channel_attention: see :class:`AttentionBlock`.
-        spatial_attention: see :class:`AttentionBlock`.
+        attention: see :class:`AttentionBlock`.
     """
 
     def __init__(
         self,
         widths: Sequence[int] = (32, 64, 96, 128),
-        channel_attention: bool = True,
-        spatial_attention: bool = True,
+        attention: Attention = CBAM,
     ) -> None:
         super().__init__()
         self.map_stem = nn.Conv2d(3, STEM, 3, padding=1)
         self.point_stem = nn.Conv2d(3, STEM, 3, padding=1)
         self.noise_stem = nn.Conv2d(1, 2 * STEM, 3, padding=1)
-        attention = (channel_attention, spatial_attention)
+        fine = attention.without_self_attention()
         one, two, three, four = widths
-        self.down1 = ResidualBlock(4 * STEM, one, 2, *attention)
-        self.down2 = ResidualBlock(one, two, 2, *attention)
-        self.down3 = ResidualBlock(two, three, 2, *attention)
-        self.down4 = ResidualBlock(three, four, 2, *attention)
-        self.up4 = UpBlock(four, three, *attention)
-        self.up3 = UpBlock(three, two, *attention)
-        self.up2 = UpBlock(two, one, *attention)
-        self.up1 = UpBlock(one, STEM, False, False)
+        self.down1 = ResidualBlock(4 * STEM, one, 2, fine)
+        self.down2 = ResidualBlock(one, two, 2, attention)
+        self.down3 = ResidualBlock(two, three, 2, attention)
+        self.down4 = ResidualBlock(three, four, 2, attention)
+        self.up4 = UpBlock(four, three, attention)
+        self.up3 = UpBlock(three, two, attention)
+        self.up2 = UpBlock(two, one, fine)
+        self.up1 = UpBlock(one, STEM, Attention(False, False))
         self.head = nn.Conv2d(STEM, 3, 1)
 
     def forward(self, map_image: Tensor, point_image: Tensor, noise: Tensor) -> Tensor:

@@ -10,6 +10,7 @@ import torch
 from torch import Tensor, nn
 
 from ..errors import ConfigError
+from .attention import Attention
 from .config import TrainingConfig
 from .dataset import Batch
 from .discriminators import Discriminator
@@ -30,9 +31,9 @@ class Networks:
     def __init__(self, config: TrainingConfig, device: torch.device) -> None:
         torch.manual_seed(config.seed)
         self.generator = make_generator(config)
-        attention = (config.channel_attention, config.spatial_attention)
-        self.map_discriminator = Discriminator(config.discriminator_width, *attention)
-        self.point_discriminator = Discriminator(config.discriminator_width, *attention)
+        attention = attention_of(config)
+        self.map_discriminator = Discriminator(config.discriminator_width, attention)
+        self.point_discriminator = Discriminator(config.discriminator_width, attention)
         self.average = copy.deepcopy(self.generator).requires_grad_(False).eval()
         rates = {
             "generator": config.generator_lr,
@@ -96,7 +97,12 @@ def _placed(network: nn.Module, device: torch.device) -> nn.Module:
 
 def make_generator(config: TrainingConfig) -> Generator:
     """The generator that a recipe asks for, with fresh weights."""
-    return Generator(config.widths, config.channel_attention, config.spatial_attention)
+    return Generator(config.widths, attention_of(config))
+
+
+def attention_of(config: TrainingConfig) -> Attention:
+    """The kinds of attention that a recipe asks for, in all three networks."""
+    return Attention(config.channel_attention, config.spatial_attention, config.self_attention)
 
 
 @dataclass(frozen=True)
