@@ -57,3 +57,8 @@ def test_pixel_loss() -> None:
 def test_generator_loss_weights() -> None:
     parts = (torch.tensor(3.0), torch.tensor(0.2), torch.tensor(7.0))
     assert losses.generator_loss(*parts).item() == pytest.approx(0.5 * 3 + 20 * 0.2 + 7)
+
+
+def test_adaptive_shares_follow_the_errors_of_the_discriminators() -> None:
+    assert losses.adaptive_shares(0.2, 0.4, alpha=3.0) == pytest.approx((0.6, 0.4))
+    assert losses.adaptive_shares(0.5, 0.5, alpha=1.0) == pytest.approx((0.5, 0.5))

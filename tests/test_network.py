@@ -9,12 +9,16 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
+from cbagan_ompl import ConfigError  # noqa: E402
 from cbagan_ompl.network.attention import (  # noqa: E402
+    CBAM,
+    Attention,
     AttentionBlock,
     ChannelAttention,
+    SelfAttention,
     SpatialAttention,
 )
-from cbagan_ompl.network.config import PRESETS  # noqa: E402
+from cbagan_ompl.network.config import NETWORKS, PRESETS, TrainingConfig  # noqa: E402
 from cbagan_ompl.network.discriminators import Discriminator  # noqa: E402
 from cbagan_ompl.network.encoding import (  # noqa: E402
     map_image,
@@ -23,9 +27,9 @@ from cbagan_ompl.network.encoding import (  # noqa: E402
     region_probability,
 )
 from cbagan_ompl.network.generator import Generator  # noqa: E402
-from cbagan_ompl.network.networks import make_generator  # noqa: E402
+from cbagan_ompl.network.networks import attention_of, make_generator  # noqa: E402
 
-SWITCHES = list(itertools.product([True, False], repeat=2))
+SWITCHES = list(itertools.product([True, False], repeat=3))
 
 
 def parameters(module: torch.nn.Module) -> int:
@@ -37,6 +41,28 @@ def test_generator_is_smaller_than_the_papers(preset: str) -> None:
     assert parameters(make_generator(PRESETS[preset])) <= 880_000
 
 
+@pytest.mark.parametrize(
+    ("network", "generator", "discriminator"),
+    [
+        ("cbagan", 807_242, 415_036),
+        ("sa", 795_402, 397_780),
+        ("ca", 801_475, 406_505),
+        ("none", 789_635, 389_249),
+        ("sagan", 1_243_348, 471_618),
+    ],
+)
+def test_sizes_of_the_networks(network: str, generator: int, discriminator: int) -> None:
+    config = TrainingConfig().with_network(network)
+    assert parameters(make_generator(config)) == generator
+    assert parameters(Discriminator(attention=attention_of(config))) == discriminator
+
+
+def test_every_network_is_tested_for_its_size() -> None:
+    assert len(NETWORKS) == 5
+    with pytest.raises(ConfigError, match=r"'unet'.*cbagan, sa, ca, none, sagan"):
+        TrainingConfig().with_network("unet")
+
+
 @pytest.mark.parametrize("size", [(16, 16), (48, 32)])
 def test_generator_keeps_height_and_width(size: tuple[int, int]) -> None:
     generator = Generator((4, 4, 6, 8)).eval()
@@ -46,11 +72,13 @@ def test_generator_keeps_height_and_width(size: tuple[int, int]) -> None:
 
 
 @pytest.mark.parametrize("switches", SWITCHES)
-def test_ablations_of_attention(switches: tuple[bool, bool]) -> None:
-    names = [name for name, _ in Discriminator(4, *switches).named_parameters()]
-    names += [name for name, _ in Generator((4, 4, 4, 4), *switches).named_parameters()]
-    assert any(".channel." in name for name in names) is switches[0]
-    assert any(".spatial." in name for name in names) is switches[1]
+@pytest.mark.parametrize("network", ["generator", "discriminator"])
+def test_kinds_of_attention(network: str, switches: tuple[bool, bool, bool]) -> None:
+    kinds = Attention(*switches)
+    module = Generator((8, 8, 8, 8), kinds) if network == "generator" else Discriminator(8, kinds)
+    names = [name for name, _ in module.named_parameters()]
+    for kind, wanted in zip((".channel.", ".spatial.", ".whole."), switches, strict=True):
+        assert any(kind in name for name in names) is wanted
 
 
 def test_attention_follows_the_papers_equations() -> None:
@@ -67,11 +95,24 @@ def test_attention_follows_the_papers_equations() -> None:
 
 
 def test_attention_block_is_residual_around_both() -> None:
-    features, block = torch.randn(2, 8, 5, 7), AttentionBlock(8)
+    features, block = torch.randn(2, 8, 5, 7), AttentionBlock(8, CBAM)
     attended = block.channel(features) * features
     expected = features + block.spatial(attended) * attended
     torch.testing.assert_close(block(features), expected)
-    assert AttentionBlock(8, False, False)(features) is features
+    assert AttentionBlock(8, Attention(False, False))(features) is features
+
+
+def test_self_attention_follows_its_definition() -> None:
+    features, layer = torch.randn(2, 16, 3, 4), SelfAttention(16)
+    assert torch.equal(layer(features), features), "it starts as the identity"
+    torch.nn.init.constant_(layer.factor, 0.7)
+    pixels = features[1].flatten(1).T
+    projected = pixels @ layer.project.weight[:, :, 0, 0].T + layer.project.bias
+    query, key, value = projected[:, :2], projected[:, 2:4], projected[:, 4:]
+    seen = torch.softmax(query @ key.T / 2**0.5, dim=1) @ value
+    added = seen @ layer.expand.weight[:, :, 0, 0].T + layer.expand.bias
+    expected = features[1] + 0.7 * added.T.reshape(16, 3, 4)
+    torch.testing.assert_close(layer(features)[1], expected)
 
 
 def test_discriminator_judges_patches() -> None:

@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import argparse
 import json
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +14,7 @@ from training_set import SIDE, write_training_set
 
 torch = pytest.importorskip("torch")
 
-from cbagan_ompl import ConfigError, DatasetError, ModelError  # noqa: E402
+from cbagan_ompl import ConfigError, DatasetError, MissingDependencyError, ModelError  # noqa: E402
 from cbagan_ompl.network import training  # noqa: E402
 from cbagan_ompl.network.checkpoints import load_checkpoint  # noqa: E402
 from cbagan_ompl.network.cli import add_export_parser, add_train_parser  # noqa: E402
@@ -24,12 +26,13 @@ from cbagan_ompl.network.dataset import (  # noqa: E402
     transformed,
 )
 from cbagan_ompl.network.networks import Networks, encode  # noqa: E402
-from cbagan_ompl.network.training import (  # noqa: E402
+from cbagan_ompl.network.schedule import learning_rate_factor, plateau_factor  # noqa: E402
+from cbagan_ompl.network.steps import (  # noqa: E402
+    adversarial_shares,
     discriminator_step,
     generator_step,
-    learning_rate_factor,
-    train,
 )
+from cbagan_ompl.network.training import train  # noqa: E402
 
 TINY = TrainingConfig(
     epochs=2, batch_size=4, widths=(4, 4, 6, 8), discriminator_width=4, adversarial_every=2
@@ -81,7 +84,7 @@ def test_steps_change_the_weights_that_they_teach(dataset: Dataset) -> None:
     after = weights(networks)
     assert [changed(before[name], after[name]) for name in NETWORKS] == [False, True, True]
 
-    parts = generator_step(networks, TINY, batch, images, fake, adversarial=True)
+    parts = generator_step(networks, TINY, batch, images, fake, (0.5, 0.5))
     assert parts["adversarial"] > 0
     last = weights(networks)
     assert [changed(after[name], last[name]) for name in NETWORKS] == [True, False, False]
@@ -95,7 +98,7 @@ def test_the_discriminators_reach_the_generator(dataset: Dataset) -> None:
     images = encode(batch)
     before = weights(networks)["generator"]
     fake = networks.generator(images.map, images.points, torch.zeros_like(batch.free))
-    generator_step(networks, config, batch, images, fake, adversarial=True)
+    generator_step(networks, config, batch, images, fake, (0.5, 0.5))
     assert changed(before, weights(networks)["generator"])
 
 
@@ -200,6 +203,100 @@ def test_learning_rates() -> None:
     paper = TrainingConfig.preset("paper")
     assert learning_rate_factor(paper, 9, 10) == 1
     assert learning_rate_factor(paper, 25, 10) == paper.decay**2
+
+
+def test_plateau_lowers_the_learning_rates() -> None:
+    config = TINY.updated({"plateau_patience": 2, "plateau_factor": 0.5})
+    scores = [0.1, 0.3, 0.2, 0.3, 0.25, 0.4, 0.1, 0.1, 0.1]
+    factors = [plateau_factor(config, scores[:n]) for n in range(len(scores) + 1)]
+    assert factors == [1, 1, 1, 1, 1, 0.5, 0.5, 0.5, 0.5, 0.25]
+    assert plateau_factor(TINY, [0.5] * 100) == 1
+
+
+def test_plateau_is_pytorchs() -> None:
+    scores = np.random.default_rng(0).random(60).tolist()
+    config = TINY.updated({"plateau_patience": 3, "plateau_factor": 0.5})
+    optimizer = torch.optim.SGD([torch.zeros(1, requires_grad=True)], lr=1.0)
+    schedule = torch.optim.lr_scheduler.ReduceLROnPlateau(
+        optimizer, "max", factor=0.5, patience=3, threshold=0.0, eps=0.0
+    )
+    for n, score in enumerate(scores):
+        schedule.step(score)
+        assert plateau_factor(config, scores[: n + 1]) == optimizer.param_groups[0]["lr"]
+
+
+def test_adaptive_shares_of_a_recipe() -> None:
+    errors = {"map_discriminator": 0.2, "point_discriminator": 0.4}
+    assert adversarial_shares(TINY, errors) == (0.5, 0.5)
+    adaptive = TINY.updated({"adaptive_alpha": 3})
+    assert adversarial_shares(adaptive, errors) == pytest.approx((0.6, 0.4))
+
+
+@pytest.mark.parametrize(
+    "options", [{"precision": "bfloat16"}, {"self_attention": True, "widths": [8, 8, 8, 8]}]
+)
+def test_variants_train(dataset: Dataset, tmp_path: Path, options: dict[str, Any]) -> None:
+    config = TINY.updated({"epochs": 1, "discriminator_width": 8, **options})
+    result = train(dataset, config, tmp_path, device="cpu", progress=False)
+    weights = load_checkpoint(result["checkpoint"])["networks"]["generator"]
+    assert all(value.dtype != torch.bfloat16 for value in weights.values())
+
+
+def test_tensorboard_is_optional(
+    dataset: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", None)
+    with pytest.raises(MissingDependencyError, match=r"cbagan-ompl\[tensorboard\]"):
+        train(dataset, TINY, tmp_path, device="cpu", progress=False, tensorboard=True)
+
+
+def test_tensorboard_gets_losses_and_scores(dataset: Dataset, tmp_path: Path) -> None:
+    pytest.importorskip("tensorboard")
+    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+    train(dataset, TINY, tmp_path, device="cpu", progress=False, tensorboard=True)
+    events = EventAccumulator(str(tmp_path)).Reload()
+    history = load_checkpoint(tmp_path / "last.pt")["history"]
+    for group, name in (("validation", "iou"), ("losses", "pixel")):
+        values = [event.value for event in events.Scalars(f"{group}/{name}")]
+        assert values == pytest.approx([entry[group][name] for entry in history])
+
+
+# --- several processes ----------------------------------------------------------------------------
+
+
+def torchrun(processes: int, *words: str) -> None:
+    command = [sys.executable, "-m", "torch.distributed.run", "--standalone"]
+    command += [f"--nproc-per-node={processes}", *words]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_two_processes_have_the_gradients_of_one(folder: Path, tmp_path: Path) -> None:
+    script = str(Path(__file__).with_name("first_gradients.py"))
+    for processes in (1, 2):
+        torchrun(processes, script, str(folder), str(tmp_path / f"{processes}.pt"))
+    one, two = (torch.load(tmp_path / f"{n}.pt") for n in (1, 2))
+    assert one.keys() == two.keys()
+    for name in one:
+        scale = one[name].abs().max().item()
+        torch.testing.assert_close(two[name], one[name], rtol=0, atol=1e-4 * scale, msg=name)
+
+
+def test_training_under_torchrun(folder: Path, tmp_path: Path) -> None:
+    words = ["--epochs", "1", "--device", "cpu", "--set", "widths=[4,4,6,8]", "batch_size=4"]
+    words += ["discriminator_width=4", "adversarial_every=1"]
+    for processes in (1, 2):
+        run = ["train", str(folder), "--output", str(tmp_path / str(processes)), *words]
+        torchrun(processes, "-m", "cbagan_ompl.cli", *run)
+    logs = [json.loads((tmp_path / n / "log.jsonl").read_text()) for n in "12"]
+    assert logs[1]["losses"] == pytest.approx(logs[0]["losses"], rel=1e-3)
+
+
+def test_batches_that_cannot_be_shared(folder: Path, tmp_path: Path) -> None:
+    words = ["train", str(folder), "--output", str(tmp_path / "run"), "--device", "cpu"]
+    with pytest.raises(AssertionError, match="batches of 5 cannot be shared evenly by 2 processes"):
+        torchrun(2, "-m", "cbagan_ompl.cli", *words, "--set", "batch_size=5")
 
 
 # --- the data set ---------------------------------------------------------------------------------
@@ -316,6 +413,8 @@ def test_config_file_round_trip(tmp_path: Path, suffix: str) -> None:
         ("epochs: true", "epochs must be"),
         ("widths: [1, 2]", "widths are four"),
         ("schedule: none", "one-cycle, exponential"),
+        ("precision: float64", "float32, bfloat16"),
+        ("plateau_factor: 2", "plateau_factor must be above 0"),
         ("generator_lr: fast", "generator_lr"),
         ("beta1: .nan", "beta1"),
         ("[1, 2]", "holds lines such as"),
@@ -332,8 +431,8 @@ def test_bad_config_files(tmp_path: Path, text: str, message: str) -> None:
 def test_unreadable_config_and_unknown_preset(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="cannot read"):
         TrainingConfig.from_file(tmp_path / "none.yaml")
-    with pytest.raises(ConfigError, match="default, paper"):
-        TrainingConfig.preset("best")
+    with pytest.raises(ConfigError, match="best, paper"):
+        TrainingConfig.preset("worst")
 
 
 def test_numbers_that_yaml_reads_as_text() -> None:

@@ -11,7 +11,7 @@ import yaml
 from ..errors import ConfigError
 from ..files import write_json
 from . import require_torch
-from .config import PRESETS, TrainingConfig
+from .config import NETWORKS, PRESETS, TrainingConfig
 
 _TRAIN_HELP = """\
 Train the networks on a data set, and keep the best epoch.
@@ -22,6 +22,10 @@ holds last.pt (to go on from with --resume), best.pt (to export) and log.jsonl (
   cbagan-ompl train DATASET --output runs/first
   cbagan-ompl export runs/first/best.pt --output models/first.pt
   cbagan-ompl plan MAP --model models/first.pt
+
+Several processes, on one machine or more, share the work when torchrun starts them:
+
+  torchrun --nproc-per-node 4 -m cbagan_ompl.cli train DATASET --output runs/first
 """
 
 _EXPORT_HELP = """\
@@ -50,8 +54,16 @@ def add_train_parser(subparsers: Any) -> None:
     recipe.add_argument(
         "--preset",
         choices=sorted(PRESETS),
-        default="default",
-        help="default: what the bundled model was trained with; paper: the paper's table",
+        default="best",
+        help="best: what the bundled model was trained with; paper: the values of the paper "
+        "(default: best)",
+    )
+    recipe.add_argument(
+        "--network",
+        choices=NETWORKS,
+        default="cbagan",
+        help="cbagan, its ablations with spatial attention (sa), channel attention (ca) or none, "
+        "or sagan with self-attention (default: cbagan)",
     )
     recipe.add_argument("--config", metavar="FILE", help="JSON or YAML file with options")
     recipe.add_argument(
@@ -68,6 +80,9 @@ def add_train_parser(subparsers: Any) -> None:
         "--device", default="auto", help="cpu, cuda, ... (default: a GPU if there is one)"
     )
     machine.add_argument("--threads", type=int, metavar="N", help="CPU threads (default: all)")
+    parser.add_argument(
+        "--tensorboard", action="store_true", help="write logs for TensorBoard into the folder"
+    )
     parser.add_argument("--json", metavar="FILE", help="write the scores as JSON")
 
 
@@ -94,7 +109,7 @@ def recipe_of(args: argparse.Namespace) -> TrainingConfig:
     Raises:
         ConfigError: an unknown option, or a value that makes no sense.
     """
-    config = TrainingConfig.preset(args.preset)
+    config = TrainingConfig.preset(args.preset).with_network(args.network)
     if args.config is not None:
         config = TrainingConfig.from_file(args.config, config)
     values: dict[str, Any] = {}
@@ -119,17 +134,35 @@ def _train(args: argparse.Namespace) -> int:
     import torch
 
     from .dataset import load_dataset
+    from .distributed import leads
     from .training import train
 
     if args.threads is not None:
         torch.set_num_threads(args.threads)
     dataset = load_dataset(args.dataset)
-    print(f"{len(dataset.train)} tasks for training, {len(dataset.test)} for testing")
+    if leads():
+        print(f"{len(dataset.train)} tasks for training, {len(dataset.test)} for testing")
     try:
-        result = train(dataset, config, args.output, resume=args.resume, device=args.device)
+        result = train(
+            dataset,
+            config,
+            args.output,
+            resume=args.resume,
+            device=args.device,
+            tensorboard=args.tensorboard,
+        )
     except KeyboardInterrupt:
         print("interrupted; go on with the same command and --resume", file=sys.stderr)
         return 130
+    if not leads():
+        return 0
+    _print_scores(result)
+    if args.json is not None:
+        write_json(args.json, result)
+    return 0
+
+
+def _print_scores(result: dict[str, Any]) -> None:
     rows = {"best epoch": result["test"], **result["trivial"]}
     print(f"\nscores of the region on the test tasks (best epoch: {result['epoch']})")
     for name, scores in rows.items():
@@ -138,9 +171,6 @@ def _train(args: argparse.Namespace) -> int:
             f"connectivity {scores['connectivity']:.1%}"
         )
     print(f"export it with: cbagan-ompl export {result['checkpoint']} --output MODEL.pt")
-    if args.json is not None:
-        write_json(args.json, result)
-    return 0
 
 
 def _export(args: argparse.Namespace) -> int:

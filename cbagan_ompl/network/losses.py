@@ -84,6 +84,23 @@ def adversarial_loss(fake_logits: Tensor) -> Tensor:
     return functional.binary_cross_entropy_with_logits(fake_logits, torch.ones_like(fake_logits))
 
 
+def adaptive_shares(map_loss: float, point_loss: float, alpha: float) -> tuple[float, float]:
+    """Weights of the two adversarial losses in the adaptive generator loss; they add up to 1.
+
+    The paper names the variant and its alpha (3) and gives no formula. This is the one of the
+    work that it builds on (Zhang et al., "Generative adversarial network based heuristics for
+    sampling-based path planning"): each discriminator weighs as much as it errs, and the map
+    discriminator alpha times as much.
+
+    Args:
+        map_loss: :func:`discriminator_loss` of the map discriminator.
+        point_loss: the same of the point discriminator.
+        alpha: factor on the map discriminator's share.
+    """
+    total = alpha * map_loss + point_loss
+    return alpha * map_loss / total, point_loss / total
+
+
 def pixel_loss(image: Tensor, target: Tensor) -> Tensor:
     """L_mse (eq. mse_loss), the mean over pixels and channels.
 
@@ -104,7 +121,8 @@ def generator_loss(
     """L_G (eq. total_generator_loss) plus L.
 
     Args:
-        adversarial: sum of :func:`adversarial_loss` over the two discriminators.
+        adversarial: sum of :func:`adversarial_loss` over the two discriminators; in the adaptive
+            variant twice their mean weighted by :func:`adaptive_shares`.
         pixel: :func:`pixel_loss`.
         segmentation: :func:`segmentation_loss`, already weighted.
         adversarial_weight: alpha_1 = alpha_2.

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import copy
+import os
 from dataclasses import dataclass
 from typing import Any
 
 import torch
 from torch import Tensor, nn
+from torch.nn.parallel import DistributedDataParallel
 
 from ..errors import ConfigError
 from .attention import Attention
 from .config import TrainingConfig
 from .dataset import Batch
 from .discriminators import Discriminator
+from .distributed import ProcessGroup, share_batch_norm
 from .encoding import map_image, point_image, region_image
 from .generator import Generator
 
@@ -26,31 +29,59 @@ class Networks:
     Args:
         config: the recipe; ``config.seed`` decides the initial weights.
         device: where the weights live.
+        group: the processes that share each batch.
     """
 
-    def __init__(self, config: TrainingConfig, device: torch.device) -> None:
+    def __init__(
+        self, config: TrainingConfig, device: torch.device, group: ProcessGroup | None = None
+    ) -> None:
         torch.manual_seed(config.seed)
+        self.group = group or ProcessGroup()
         self.generator = make_generator(config)
         attention = attention_of(config)
         self.map_discriminator = Discriminator(config.discriminator_width, attention)
         self.point_discriminator = Discriminator(config.discriminator_width, attention)
         self.average = copy.deepcopy(self.generator).requires_grad_(False).eval()
-        rates = {
+        self.rates = {
             "generator": config.generator_lr,
             "map_discriminator": config.map_discriminator_lr,
             "point_discriminator": config.point_discriminator_lr,
         }
         self.optimizers: dict[str, torch.optim.Optimizer] = {}
-        for name, rate in rates.items():
-            network = _placed(getattr(self, name), device)
+        self._taught: dict[str, nn.Module] = {}
+        for name, rate in self.rates.items():
+            network = getattr(self, name)
+            if self.group.size > 1:
+                share_batch_norm(network)
+            _place(network, device)
+            self._taught[name] = network
+            if self.group.size > 1:
+                self._taught[name] = DistributedDataParallel(network)
             self.optimizers[name] = torch.optim.AdamW(
                 network.parameters(),
                 lr=rate,
                 betas=(config.beta1, config.beta2),
                 weight_decay=config.weight_decay,
             )
-        _placed(self.average, device)
-        self.rates = rates
+        _place(self.average, device)
+        self._precision = torch.autocast(
+            device.type, torch.bfloat16, enabled=config.precision == "bfloat16"
+        )
+
+    def run(self, name: str, *inputs: Tensor, taught: bool = True) -> Tensor:
+        """The output of a network, in the precision of the recipe.
+
+        Args:
+            name: ``generator``, ``map_discriminator`` or ``point_discriminator``.
+            inputs: of the network.
+            taught: the backward pass reaches the weights of the network, and their gradients are
+                averaged over the processes. A discriminator that judges for the generator's sake
+                is not taught.
+        """
+        network = self._taught[name] if taught else getattr(self, name)
+        with self._precision:
+            output: Tensor = network(*inputs)
+        return output.float()
 
     def set_learning_rates(self, factor: float) -> None:
         """Set each learning rate to ``factor`` times its highest value."""
@@ -90,9 +121,9 @@ class Networks:
     _modules = ("generator", "map_discriminator", "point_discriminator", "average")
 
 
-def _placed(network: nn.Module, device: torch.device) -> nn.Module:
+def _place(network: nn.Module, device: torch.device) -> None:
     # Channels-last convolutions take two thirds of the time on a CPU.
-    return network.to(device, memory_format=torch.channels_last)  # type: ignore[call-overload, no-any-return]
+    network.to(device, memory_format=torch.channels_last)  # type: ignore[call-overload]
 
 
 def make_generator(config: TrainingConfig) -> Generator:
@@ -126,13 +157,15 @@ def encode(batch: Batch) -> Images:
 
 
 def pick_device(name: str) -> torch.device:
-    """The device of a name; ``auto`` is a GPU if there is one.
+    """The device of a name; ``auto`` is a GPU if there is one, each process its own.
 
     Raises:
         ConfigError: no such device.
     """
     if name == "auto":
-        return torch.device("cuda" if torch.cuda.is_available() else "cpu")
+        if not torch.cuda.is_available():
+            return torch.device("cpu")
+        name = f"cuda:{os.environ.get('LOCAL_RANK', '0')}"
     try:
         device = torch.device(name)
         torch.empty(1, device=device)

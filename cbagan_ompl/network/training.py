@@ -12,17 +12,19 @@ from typing import Any
 
 import numpy as np
 import torch
-from torch import Tensor
+from numpy.typing import NDArray
 from tqdm import tqdm
 
 from ..errors import ConfigError
-from . import losses
 from .checkpoints import BEST, LAST, SCHEMA, best_generator, load_checkpoint, save_atomically
 from .config import TrainingConfig
 from .dataset import Batch, Dataset, Tasks, make_batch
-from .encoding import region_probability
+from .distributed import process_group
 from .evaluation import evaluate, trivial_scores
-from .networks import Images, Networks, encode, pick_device
+from .networks import Networks, encode, pick_device
+from .scalars import scalar_log, write_scalars
+from .schedule import learning_rate_factor, plateau_factor
+from .steps import adversarial_shares, discriminator_step, generator_step
 
 LOG = "log.jsonl"
 
@@ -60,106 +62,6 @@ class Run:
         self.history = state["history"]
 
 
-def discriminator_step(networks: Networks, images: Images, fake: Tensor) -> dict[str, float]:
-    """Teach both discriminators to tell the true regions from the generated ones.
-
-    Args:
-        networks: the weights of the two discriminators change, those of the generator do not.
-        images: a batch.
-        fake: the generated region images of the batch; no gradient flows back into them.
-
-    Returns:
-        The two losses.
-    """
-    fake = fake.detach()
-    values = {}
-    for name, condition in (
-        ("map_discriminator", images.map),
-        ("point_discriminator", images.points),
-    ):
-        network, optimizer = getattr(networks, name), networks.optimizers[name]
-        loss = losses.discriminator_loss(
-            network(condition, images.region), network(condition, fake)
-        )
-        optimizer.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
-        optimizer.step()
-        values[name] = loss.item()
-    return values
-
-
-def generator_step(
-    networks: Networks,
-    config: TrainingConfig,
-    batch: Batch,
-    images: Images,
-    fake: Tensor,
-    adversarial: bool,
-) -> dict[str, float]:
-    """Teach the generator.
-
-    Args:
-        networks: the weights of the generator change, those of the discriminators do not.
-        config: weights of the losses.
-        batch: tasks with their regions.
-        images: the same as images.
-        fake: the generator's images of the regions, with their graph.
-        adversarial: whether the discriminators have a say in this step.
-
-    Returns:
-        The parts of the loss.
-    """
-    parts = {
-        "pixel": losses.pixel_loss(fake, images.region),
-        "segmentation": losses.segmentation_loss(
-            region_probability(fake),
-            batch.region,
-            config.bce_weight,
-            config.dice_weight,
-            config.dice_smooth,
-        ),
-    }
-    judges = (networks.map_discriminator, networks.point_discriminator)
-    if adversarial:
-        # The judges pass gradients on to the image, but collect none for themselves.
-        for judge in judges:
-            judge.requires_grad_(False)
-        parts["adversarial"] = losses.adversarial_loss(
-            judges[0](images.map, fake)
-        ) + losses.adversarial_loss(judges[1](images.points, fake))
-    loss = losses.generator_loss(
-        parts.get("adversarial", fake.new_zeros(())),
-        parts["pixel"],
-        parts["segmentation"],
-        config.adversarial_weight,
-        config.pixel_weight,
-    )
-    optimizer = networks.optimizers["generator"]
-    optimizer.zero_grad()
-    loss.backward()  # type: ignore[no-untyped-call]
-    optimizer.step()
-    for judge in judges:
-        judge.requires_grad_(True)
-    return {name: value.item() for name, value in parts.items()}
-
-
-def learning_rate_factor(config: TrainingConfig, step: int, steps_per_epoch: int) -> float:
-    """Share of the highest learning rate that a step runs at.
-
-    Args:
-        config: names the schedule.
-        step: number of the step, from 0.
-        steps_per_epoch: steps in one epoch.
-    """
-    if config.schedule == "exponential":
-        return config.decay ** (step // steps_per_epoch)
-    total = config.epochs * steps_per_epoch
-    rising = config.warmup * total
-    if step < rising:
-        return (step + 1) / (rising + 1)
-    return 0.5 * (1 + math.cos(math.pi * (step - rising) / (total - rising)))
-
-
 def train(
     dataset: Dataset,
     config: TrainingConfig,
@@ -168,6 +70,7 @@ def train(
     resume: bool = False,
     device: str = "auto",
     progress: bool = True,
+    tensorboard: bool = False,
 ) -> dict[str, Any]:
     """Train the three networks.
 
@@ -176,13 +79,16 @@ def train(
     (one line an epoch). An interrupted run loses at most the epoch under way, and a resumed run
     gives the same weights as one that was never interrupted.
 
+    Under ``torchrun`` the processes share each batch, and the first one writes the files.
+
     Args:
-        dataset: see :func:`cbagan_ompl.network.dataset.load_dataset`.
+        dataset: see :func:`cbagan_ompl.datasets.layout.load_dataset`.
         config: the recipe.
         output: the folder for the files, made if missing.
         resume: go on from ``last.pt`` in that folder; without it the folder must hold none.
         device: ``auto`` (a GPU if there is one), ``cpu``, ``cuda``, ...
         progress: show a progress bar.
+        tensorboard: write losses and scores for TensorBoard into the folder as well.
 
     Returns:
         ``validation`` and ``test`` scores of the best epoch, ``trivial`` scores of predictors that
@@ -190,20 +96,51 @@ def train(
 
     Raises:
         ConfigError: ``resume`` with another recipe or data set, or without it although the folder
-            holds a run; the folder cannot be made; no such device; or the loss is not finite.
+            holds a run; the folder cannot be made; no such device; the loss is not finite; or the
+            processes cannot share a batch evenly.
+        DatasetError: the images are of a size that the networks cannot take.
+        MissingDependencyError: ``tensorboard`` without the package of that name.
         ModelError: a checkpoint that cannot be read.
     """
     folder = Path(output)
     place = pick_device(device)
+    # check_trainable(dataset)
     training, validation = dataset.split(config.validation_fraction, config.seed)
-    run = Run(
-        Networks(config, place),
-        np.random.default_rng(config.seed),
-        torch.Generator().manual_seed(config.seed),
-    )
-    if resume:
-        run.load_state_dict(_matching_checkpoint(folder / LAST, config, dataset))
-    elif (folder / LAST).exists():
+    with process_group(place) as group:
+        if config.batch_size % group.size:
+            raise ConfigError(
+                f"batches of {config.batch_size} cannot be shared evenly by {group.size} processes"
+            )
+        run = Run(
+            Networks(config, place, group),
+            np.random.default_rng(config.seed),
+            torch.Generator().manual_seed(config.seed),
+        )
+        if group.leads:
+            _prepare_folder(folder, resume)
+        if resume:
+            state = _matching_checkpoint(folder / LAST, config, dataset) if group.leads else None
+            run.load_state_dict(group.from_leader(state))
+        progress = progress and group.leads
+        if progress:
+            for name, scores in trivial_scores(validation).items():
+                print(f"for comparison, {name}: {_summary(scores)}")
+        log = scalar_log(folder, len(run.history)) if tensorboard and group.leads else None
+        for epoch in range(len(run.history), config.epochs):
+            entry = _epoch(run, config, training, validation, place, epoch, progress)
+            run.history.append(entry)
+            if group.leads:
+                _save(run, config, dataset, folder)
+                if log is not None:
+                    write_scalars(log, entry)
+            if progress:
+                scores, seconds = entry["validation"], entry["seconds"]
+                print(f"epoch {epoch + 1}/{config.epochs}: {_summary(scores)}, {seconds:.0f} s")
+        return group.from_leader(_finish(folder, dataset, place, config) if group.leads else None)
+
+
+def _prepare_folder(folder: Path, resume: bool) -> None:
+    if not resume and (folder / LAST).exists():
         raise ConfigError(
             f"{folder} holds a run already; resume it (--resume), or choose another folder"
         )
@@ -211,23 +148,27 @@ def train(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ConfigError(f"cannot make the folder {folder}: {error.strerror or error}") from error
-    if progress:
-        for name, scores in trivial_scores(validation).items():
-            print(f"for comparison, {name}: {_summary(scores)}")
 
-    model = run.networks.average if config.ema_decay else run.networks.generator
-    for epoch in range(len(run.history), config.epochs):
-        began = time.perf_counter()
-        means = _train_epoch(run, config, training, place, epoch, progress)
-        scores = evaluate(model, validation, place, config.batch_size)
-        seconds = round(time.perf_counter() - began, 1)
-        run.history.append(
-            {"epoch": epoch + 1, "seconds": seconds, "losses": means, "validation": scores}
-        )
-        _save(run, config, dataset, folder)
-        if progress:
-            print(f"epoch {epoch + 1}/{config.epochs}: {_summary(scores)}, {seconds:.0f} s")
-    return _finish(folder, dataset, place, config)
+
+def _epoch(
+    run: Run,
+    config: TrainingConfig,
+    training: Tasks,
+    validation: Tasks,
+    device: torch.device,
+    epoch: int,
+    progress: bool,
+) -> dict[str, Any]:
+    """One pass over the tasks, and its entry in the log."""
+    began = time.perf_counter()
+    means = _train_epoch(run, config, training, device, epoch, progress)
+    networks = run.networks
+    model = networks.average if config.ema_decay else networks.generator
+    scores = networks.group.from_leader(
+        evaluate(model, validation, device, config.batch_size) if networks.group.leads else None
+    )
+    seconds = round(time.perf_counter() - began, 1)
+    return {"epoch": epoch + 1, "seconds": seconds, "losses": means, "validation": scores}
 
 
 def _train_epoch(
@@ -238,30 +179,19 @@ def _train_epoch(
     epoch: int,
     progress: bool,
 ) -> dict[str, float]:
-    """One pass over the tasks; means of the losses over the steps in which they were computed."""
+    """Means of the losses over the steps in which they were computed."""
     order = run.rng.permutation(len(tasks))
     # The tasks that fill no batch wait for the next epoch, which has another order.
     steps = max(1, len(order) // config.batch_size)
+    plateau = plateau_factor(config, [entry["validation"]["iou"] for entry in run.history])
     totals: dict[str, list[float]] = {}
     run.networks.generator.train()
     bar = tqdm(range(steps), desc=f"epoch {epoch + 1}", leave=False, disable=not progress)
     for i in bar:
         step = epoch * steps + i
-        run.networks.set_learning_rates(learning_rate_factor(config, step, steps))
-        batch = make_batch(
-            tasks,
-            order[i * config.batch_size : (i + 1) * config.batch_size],
-            device,
-            run.rng,
-            symmetries=config.symmetries,
-            reversal=config.reversal,
-        )
-        images = encode(batch)
-        noise = torch.randn(batch.free.shape, generator=run.noise_rng).to(device)
-        fake = run.networks.generator(images.map, images.points, noise)
-        adversarial = step % config.adversarial_every == 0
-        values = discriminator_step(run.networks, images, fake) if adversarial else {}
-        values |= generator_step(run.networks, config, batch, images, fake, adversarial)
+        run.networks.set_learning_rates(plateau * learning_rate_factor(config, step, steps))
+        indices = order[i * config.batch_size : (i + 1) * config.batch_size]
+        values = _step(run, config, tasks, indices, device, step)
         if not all(math.isfinite(value) for value in values.values()):
             raise ConfigError(
                 f"the loss is not finite in epoch {epoch + 1}; lower the learning rates"
@@ -271,6 +201,36 @@ def _train_epoch(
             totals.setdefault(name, []).append(value)
         bar.set_postfix(segmentation=f"{values['segmentation']:.3f}")
     return {name: float(np.mean(entries)) for name, entries in totals.items()}
+
+
+def _step(
+    run: Run,
+    config: TrainingConfig,
+    tasks: Tasks,
+    indices: NDArray[np.int64],
+    device: torch.device,
+    step: int,
+) -> dict[str, float]:
+    """Teach the networks with one batch, or this process's share of it."""
+    networks = run.networks
+    batch = make_batch(
+        tasks,
+        indices,
+        device,
+        run.rng,
+        symmetries=config.symmetries,
+        reversal=config.reversal,
+    )
+    noise = torch.randn(batch.free.shape, generator=run.noise_rng).to(device)
+    share = networks.group.share
+    batch, noise = Batch(*map(share, vars(batch).values())), share(noise)
+    images = encode(batch)
+    fake = networks.run("generator", images.map, images.points, noise)
+    if step % config.adversarial_every:
+        return generator_step(networks, config, batch, images, fake, None)
+    errors = discriminator_step(networks, images, fake)
+    shares = adversarial_shares(config, errors)
+    return errors | generator_step(networks, config, batch, images, fake, shares)
 
 
 def _save(run: Run, config: TrainingConfig, dataset: Dataset, folder: Path) -> None:

@@ -1,0 +1,142 @@
+"""Training in several processes at once, as ``torchrun`` starts them.
+
+Every process draws the same batches and keeps its share of each. Batch norm takes its mean and
+variance over all shares, so that the gradients are those of one process with the whole batch.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import torch
+from torch import Tensor, distributed, nn
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class ProcessGroup:
+    """The processes of a training run.
+
+    Attributes:
+        rank: number of this process.
+        size: how many there are.
+    """
+
+    rank: int = 0
+    size: int = 1
+
+    @property
+    def leads(self) -> bool:
+        """Whether this process is the one that validates and writes files."""
+        return self.rank == 0
+
+    def share(self, batch: Tensor) -> Tensor:
+        """This process's share of a batch, (B, ...) -> (B / size, ...)."""
+        return batch[self.rank :: self.size]
+
+    def means(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Means over the processes."""
+        if self.size == 1:
+            return dict(values)
+        mean = torch.tensor(list(values.values()), dtype=torch.float64)
+        if distributed.get_backend() == "nccl":
+            mean = mean.cuda()
+        distributed.all_reduce(mean)
+        return dict(zip(values, (mean / self.size).tolist(), strict=True))
+
+    def from_leader(self, value: T | None) -> T:
+        """What the leading process gives here; the others give nothing."""
+        values = [value]
+        if self.size > 1:
+            distributed.broadcast_object_list(values)
+        assert values[0] is not None
+        return values[0]
+
+
+def leads() -> bool:
+    """Whether this process is the first or the only one, asked before they know each other."""
+    return os.environ.get("RANK", "0") == "0"
+
+
+@contextmanager
+def process_group(device: torch.device) -> Iterator[ProcessGroup]:
+    """The processes that ``torchrun`` started, or this process alone.
+
+    Args:
+        device: where the networks are; decides how the processes talk.
+    """
+    if int(os.environ.get("WORLD_SIZE", "1")) == 1:
+        yield ProcessGroup()
+        return
+    distributed.init_process_group("nccl" if device.type == "cuda" else "gloo")
+    try:
+        yield ProcessGroup(distributed.get_rank(), distributed.get_world_size())
+    finally:
+        distributed.destroy_process_group()
+
+
+class GlobalBatchNorm(nn.BatchNorm2d):
+    """Batch norm over the shares of all processes; each must have the same number of values.
+
+    PyTorch's own (``SyncBatchNorm``) has no CPU version.
+    """
+
+    def forward(self, features: Tensor) -> Tensor:
+        """Features of the same shape (B, C, H, W)."""
+        if not self.training:
+            return super().forward(features)
+        count = distributed.get_world_size() * features.numel() // features.shape[1]
+        mean = _mean(features)
+        deviation = features - mean.view(1, -1, 1, 1)
+        variance = _mean(deviation.square())
+        with torch.no_grad():
+            assert self.running_mean is not None
+            assert self.running_var is not None
+            assert self.num_batches_tracked is not None
+            assert self.momentum is not None
+            self.running_mean.lerp_(mean, self.momentum)
+            self.running_var.lerp_(variance * count / (count - 1), self.momentum)
+            self.num_batches_tracked += 1
+        scale = self.weight * torch.rsqrt(variance + self.eps)
+        shifted: Tensor = deviation * scale.view(1, -1, 1, 1) + self.bias.view(1, -1, 1, 1)
+        return shifted
+
+
+def _mean(features: Tensor) -> Tensor:
+    """Mean of each channel over all shares, with gradients; (B, C, H, W) -> (C,)."""
+    total: Tensor = _Sum.apply(features.mean((0, 2, 3)))  # type: ignore[no-untyped-call]
+    return total / distributed.get_world_size()
+
+
+class _Sum(torch.autograd.Function):
+    """Sum over the processes. Every process's loss depends on it, so gradients add up as well."""
+
+    @staticmethod
+    def forward(context: Any, values: Tensor) -> Tensor:
+        return _Sum._over_processes(values)
+
+    @staticmethod
+    def backward(context: Any, gradients: Tensor) -> Tensor:
+        return _Sum._over_processes(gradients)
+
+    @staticmethod
+    def _over_processes(values: Tensor) -> Tensor:
+        total = values.clone()
+        distributed.all_reduce(total)
+        return total
+
+
+def share_batch_norm(network: nn.Module) -> None:
+    """Exchange every batch norm inside a network for one over all processes."""
+    for name, child in network.named_children():
+        if isinstance(child, nn.BatchNorm2d):
+            shared = GlobalBatchNorm(child.num_features, child.eps)
+            shared.load_state_dict(child.state_dict())
+            setattr(network, name, shared)
+        else:
+            share_batch_norm(child)
