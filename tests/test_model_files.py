@@ -18,9 +18,15 @@ torch = pytest.importorskip("torch")
 from cbagan_ompl import GridMap, Heatmap, ModelError, TaskError  # noqa: E402
 from cbagan_ompl.network import model_files  # noqa: E402
 from cbagan_ompl.network.checkpoints import best_generator, load_checkpoint  # noqa: E402
-from cbagan_ompl.network.config import TrainingConfig  # noqa: E402
+from cbagan_ompl.network.config import NETWORKS, TrainingConfig  # noqa: E402
 from cbagan_ompl.network.dataset import load_dataset  # noqa: E402
-from cbagan_ompl.network.export import RegionModel, export, save_script  # noqa: E402
+from cbagan_ompl.network.export import (  # noqa: E402
+    RegionModel,
+    export,
+    model_card,
+    save_script,
+)
+from cbagan_ompl.network.networks import make_generator  # noqa: E402
 from cbagan_ompl.network.predictor import (  # noqa: E402
     Predictor,
     load_model,
@@ -72,6 +78,43 @@ def test_eager_scripted_and_reloaded_agree(
     assert 0 <= outputs[0].min() <= outputs[0].max() <= 1
     for output in outputs[1:]:
         torch.testing.assert_close(output, outputs[0], rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize("network", NETWORKS)
+@pytest.mark.parametrize("size", [(64, 64), (40, 88)])
+def test_every_network_agrees_when_exported(
+    network: str, size: tuple[int, int], tmp_path: Path
+) -> None:
+    torch.manual_seed(0)
+    generator = make_generator(TrainingConfig().with_network(network)).eval()
+    for name, parameter in generator.named_parameters():
+        if name.endswith("whole.factor"):
+            torch.nn.init.constant_(parameter, 0.5)  # or self-attention would do nothing yet
+    eager = RegionModel(generator).eval()
+    save_script(eager, tmp_path / "model.pt", {})
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        models = (torch.jit.script(eager), torch.jit.load(str(tmp_path / "model.pt")))
+    free, ends = (torch.rand(1, 1, *size) > 0.3).float(), torch.rand(2, 1, 2) * 40
+    with torch.inference_mode():
+        expected = eager(free, ends[0], ends[1])
+        for model in models:
+            torch.testing.assert_close(model(free, ends[0], ends[1]), expected, rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("network", "words"),
+    [
+        ("cbagan", "convolutional block attention GAN"),
+        ("sagan", "GAN with self-attention"),
+        ("sa", "GAN with spatial attention"),
+        ("none", "GAN with no attention"),
+    ],
+)
+def test_the_card_names_the_network(exported: Path, network: str, words: str) -> None:
+    record = model_files.read_record(exported)
+    record["recipe"] = TINY.with_network(network).to_dict()
+    assert words in model_card(record)
 
 
 def test_record_card_and_manifest(exported: Path) -> None:

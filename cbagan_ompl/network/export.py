@@ -158,8 +158,8 @@ def model_card(record: dict[str, Any]) -> str:
     return f"""# {record["name"]}
 
 Predicts, for a 2-D occupancy map with a start and a goal, the region that good paths probably run
-through. The generator of a convolutional block attention GAN (CBAGAN-RRT), exported as
-TorchScript on {record["date"]} with torch {record["torch"]}.
+through: the generator of {_network(record["recipe"])}, trained against a map and a
+point discriminator, exported as TorchScript on {record["date"]} with torch {record["torch"]}.
 
 - Input: {record["inputs"]}
 - Output: {record["outputs"]}
@@ -195,6 +195,16 @@ Epoch {record["epoch"]} of:
 
 {recipe}
 """
+
+
+def _network(recipe: dict[str, Any]) -> str:
+    """What the network of a recipe is called."""
+    kinds = [name for name in ("channel", "spatial", "self") if recipe.get(f"{name}_attention")]
+    if kinds == ["self"]:
+        return "a GAN with self-attention (SAGAN)"
+    if kinds == ["channel", "spatial"]:
+        return "a convolutional block attention GAN (CBAGAN-RRT)"
+    return f"a GAN with {' and '.join(kinds) or 'no'} attention"
 
 
 def _update_manifest(model: Path) -> None:
