@@ -21,8 +21,8 @@ from scipy.stats import bootstrap
 from tqdm import tqdm
 
 from cbagan_ompl import GridMap, Heatmap, Predictor, load_model, plan
-from cbagan_ompl.network.dataset import Tasks, load_dataset
-from cbagan_ompl.network.metrics import region_scores
+from cbagan_ompl.datasets.layout import Tasks, load_dataset
+from cbagan_ompl.evaluation.metrics import region_scores
 from cbagan_ompl.planning.compat import ompl_version
 
 # Pixels of the 64 x 64 maps. RRT's gives trees of the size that the paper reports.

@@ -11,6 +11,7 @@ from typing import Any
 
 from . import __version__
 from .benchmarking.cli import add_benchmark_parser
+from .datasets.cli import add_dataset_parser
 from .draws import DEFAULT_UNIFORM_FRACTION
 from .errors import CbaganOmplError, ConfigError
 from .files import write_json
@@ -76,6 +77,7 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     _add_plan_parser(commands)
     add_benchmark_parser(commands)
+    add_dataset_parser(commands)
     add_train_parser(commands)
     add_export_parser(commands)
     return parser

@@ -45,7 +45,7 @@ def walls_with_gaps(rng: np.random.Generator, width: int, height: int) -> Mask:
             centre = (i + rng.uniform(0.4, 0.6)) * lane, rng.uniform(0.05, 0.95) * height
             half = rng.uniform(0.06, 0.2) * lane, rng.uniform(0.06, 0.3) * lane
             free &= ~_box(free, centre, half)
-    return _without_pockets(free)
+    return without_pockets(free)
 
 
 def rooms(rng: np.random.Generator, width: int, height: int) -> Mask:
@@ -86,7 +86,7 @@ def rooms(rng: np.random.Generator, width: int, height: int) -> Mask:
         split(mask[:, x + _WALL :], doors[:, x + _WALL :])
 
     split(free[_WALL:-_WALL, _WALL:-_WALL], doorway[_WALL - 1 : 1 - _WALL, _WALL - 1 : 1 - _WALL])
-    return _without_pockets(free)
+    return without_pockets(free)
 
 
 def maze(rng: np.random.Generator, width: int, height: int) -> Mask:
@@ -130,7 +130,7 @@ def clutter(rng: np.random.Generator, width: int, height: int) -> Mask:
     """Boxes and ellipses of many sizes, turned at random, on a quarter to a third of the map."""
     free, unit = _canvas(width, height)
     _scatter(free, rng, unit, rng.uniform(0.25, 0.34))
-    return _without_pockets(free)
+    return without_pockets(free)
 
 
 def narrow_passage(rng: np.random.Generator, width: int, height: int) -> Mask:
@@ -144,7 +144,7 @@ def narrow_passage(rng: np.random.Generator, width: int, height: int) -> Mask:
     _scatter(free, rng, unit, rng.uniform(0.14, 0.2), clear)
     free[:, left : left + thick] = False
     free[top : top + gap, left : left + thick] = True
-    return _without_pockets(free)
+    return without_pockets(free)
 
 
 def bug_trap(rng: np.random.Generator, width: int, height: int) -> Mask:
@@ -167,7 +167,7 @@ def bug_trap(rng: np.random.Generator, width: int, height: int) -> Mask:
     clear = _ellipse(free, (x, y), (a + 2.5 * unit, b + 2.5 * unit), power=3.0)
     clear |= _box(free, (x - a, y), (5 * unit, 3 * unit))
     _scatter(free, rng, 0.8 * unit, (~free).mean() + rng.uniform(0.07, 0.11), clear)
-    return _without_pockets(free)
+    return without_pockets(free)
 
 
 def warehouse(rng: np.random.Generator, width: int, height: int) -> Mask:
@@ -192,16 +192,68 @@ def warehouse(rng: np.random.Generator, width: int, height: int) -> Mask:
     for _ in range(rng.integers(3, 7)):  # things left standing in the aisles
         centre = rng.uniform(dock, width), rng.uniform(0, height)
         free &= ~_box(free, centre, (0.6 * unit, 0.6 * unit), rng.uniform(0, pi))
-    return _without_pockets(free)
+    return without_pockets(free)
+
+
+def blocks(rng: np.random.Generator, width: int, height: int) -> Mask:
+    """Upright boxes, apart or overlapping."""
+    free, unit = _canvas(width, height)
+    share = rng.uniform(0.1, 0.3)
+    while (~free).mean() < share:
+        centre = rng.uniform(0, width), rng.uniform(0, height)
+        free &= ~_box(free, centre, (rng.uniform(2, 9) * unit, rng.uniform(2, 9) * unit))
+    return without_pockets(free)
+
+
+def ellipses(rng: np.random.Generator, width: int, height: int) -> Mask:
+    """Ellipses at any angle."""
+    free, unit = _canvas(width, height)
+    share = rng.uniform(0.1, 0.3)
+    while (~free).mean() < share:
+        centre = rng.uniform(0, width), rng.uniform(0, height)
+        half = rng.uniform(2, 9) * unit, rng.uniform(2, 9) * unit
+        free &= ~_ellipse(free, centre, half, rng.uniform(0, pi))
+    return without_pockets(free)
+
+
+def triangles(rng: np.random.Generator, width: int, height: int) -> Mask:
+    """Triangles at any angle."""
+    free, unit = _canvas(width, height)
+    share = rng.uniform(0.08, 0.22)
+    while (~free).mean() < share:
+        centre = rng.uniform(0, width), rng.uniform(0, height)
+        free &= ~_triangle(free, centre, rng.uniform(5, 14) * unit, rng.uniform(0, 2 * pi))
+    return without_pockets(free)
+
+
+def tl_shapes(rng: np.random.Generator, width: int, height: int) -> Mask:
+    """Shapes of the letters T and L, upright or turned by right angles or a little more."""
+    free, unit = _canvas(width, height)
+    share = rng.uniform(0.1, 0.24)
+    while (~free).mean() < share:
+        centre = rng.uniform(0, width), rng.uniform(0, height)
+        angle = rng.integers(4) * pi / 2 + rng.normal(0, 0.1)
+        bar, stem, thick = (rng.uniform(*span) * unit for span in ((4, 9), (4, 10), (1.2, 2.5)))
+        free &= ~_box(free, centre, (bar, thick), angle)
+        # The stem hangs from the middle of the bar, or from one end of it.
+        along = (bar - thick) * int(rng.integers(-1, 2))
+        x = centre[0] + cos(angle) * along - sin(angle) * stem
+        y = centre[1] + sin(angle) * along + cos(angle) * stem
+        free &= ~_box(free, (x, y), (thick, stem), angle)
+    return without_pockets(free)
 
 
 #: Every family by its name.
 FAMILIES: dict[str, Callable[[np.random.Generator, int, int], Mask]] = {
+    "blocks": blocks,
     "bug_trap": bug_trap,
     "clutter": clutter,
+    "ellipses": ellipses,
     "maze": maze,
     "narrow_passage": narrow_passage,
     "rooms": rooms,
+    "tl_shapes": tl_shapes,
+    "triangles": triangles,
     "walls_with_gaps": walls_with_gaps,
     "warehouse": warehouse,
 }
@@ -263,7 +315,16 @@ def _ellipse(
     return abs(x / half[0]) ** power + abs(y / half[1]) ** power <= 1
 
 
-def _without_pockets(free: Mask) -> Mask:
+def _triangle(free: Mask, centre: Point, size: float, angle: float) -> Mask:
+    """The pixels of a triangle with equal sides, ``size`` from its middle to its corners."""
+    inside = np.ones_like(free)
+    for side in range(3):
+        x, _ = _turned(free, centre, angle + 2 * pi * side / 3)
+        inside &= x <= size / 2
+    return inside
+
+
+def without_pockets(free: Mask) -> Mask:
     """Fill all but the largest connected free part."""
     count, labels = cv2.connectedComponents(free.astype(np.uint8), connectivity=4)
     if count <= 2:

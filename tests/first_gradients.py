@@ -10,8 +10,8 @@ import sys
 import numpy as np
 import torch
 
+from cbagan_ompl.datasets.layout import load_dataset
 from cbagan_ompl.network.config import TrainingConfig
-from cbagan_ompl.network.dataset import load_dataset
 from cbagan_ompl.network.distributed import process_group
 from cbagan_ompl.network.networks import Networks
 from cbagan_ompl.network.training import Run, _step

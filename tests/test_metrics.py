@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cbagan_ompl.network.metrics import confusion, joins, region_scores
+from cbagan_ompl.evaluation.metrics import confusion, joins, region_scores
 
 
 def mask(*rows: str) -> NDArray[np.bool_]:

@@ -16,10 +16,10 @@ from training_set import write_training_set
 torch = pytest.importorskip("torch")
 
 from cbagan_ompl import GridMap, Heatmap, ModelError, TaskError  # noqa: E402
+from cbagan_ompl.datasets.layout import load_dataset  # noqa: E402
 from cbagan_ompl.network import model_files  # noqa: E402
 from cbagan_ompl.network.checkpoints import best_generator, load_checkpoint  # noqa: E402
 from cbagan_ompl.network.config import NETWORKS, TrainingConfig  # noqa: E402
-from cbagan_ompl.network.dataset import load_dataset  # noqa: E402
 from cbagan_ompl.network.export import (  # noqa: E402
     RegionModel,
     export,

@@ -150,7 +150,7 @@ def test_spots_move_with_the_fraction_of_a_pixel() -> None:
 
 def test_the_package_does_not_import_torch() -> None:
     code = (
-        "import sys, cbagan_ompl, cbagan_ompl.network.cli, cbagan_ompl.network.metrics;"
+        "import sys, cbagan_ompl, cbagan_ompl.network.cli, cbagan_ompl.evaluation.metrics;"
         "from cbagan_ompl.network.predictor import load_model;"
         "sys.exit('torch' in sys.modules)"
     )

@@ -15,16 +15,12 @@ from training_set import SIDE, write_training_set
 torch = pytest.importorskip("torch")
 
 from cbagan_ompl import ConfigError, DatasetError, MissingDependencyError, ModelError  # noqa: E402
+from cbagan_ompl.datasets.layout import Dataset, load_dataset  # noqa: E402
 from cbagan_ompl.network import training  # noqa: E402
 from cbagan_ompl.network.checkpoints import load_checkpoint  # noqa: E402
 from cbagan_ompl.network.cli import add_export_parser, add_train_parser  # noqa: E402
 from cbagan_ompl.network.config import TrainingConfig  # noqa: E402
-from cbagan_ompl.network.dataset import (  # noqa: E402
-    Dataset,
-    load_dataset,
-    make_batch,
-    transformed,
-)
+from cbagan_ompl.network.dataset import make_batch, transformed  # noqa: E402
 from cbagan_ompl.network.networks import Networks, encode  # noqa: E402
 from cbagan_ompl.network.schedule import learning_rate_factor, plateau_factor  # noqa: E402
 from cbagan_ompl.network.steps import (  # noqa: E402

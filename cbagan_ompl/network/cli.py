@@ -133,7 +133,7 @@ def _train(args: argparse.Namespace) -> int:
     require_torch()
     import torch
 
-    from .dataset import load_dataset
+    from ..datasets.layout import load_dataset
     from .distributed import leads
     from .training import train
 

@@ -10,9 +10,10 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from .dataset import Tasks, make_batch
+from ..datasets.layout import Tasks
+from ..evaluation.metrics import region_scores
+from .dataset import make_batch
 from .encoding import region_probability
-from .metrics import region_scores
 from .networks import encode
 
 #: A predicted probability from here on counts as region.
@@ -25,7 +26,7 @@ LINE_HALF_WIDTH = 3
 def evaluate(
     generator: nn.Module, tasks: Tasks, device: torch.device, batch_size: int
 ) -> dict[str, float]:
-    """Scores of a generator's regions, see :func:`cbagan_ompl.network.metrics.region_scores`."""
+    """Scores of a generator's regions, see :func:`cbagan_ompl.evaluation.metrics.region_scores`."""
     predicted = np.concatenate(list(_predict(generator, tasks, device, batch_size)))
     return region_scores(predicted, tasks.region.astype(bool), tasks.free, tasks.start, tasks.goal)
 

@@ -15,10 +15,11 @@ import torch
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from ..datasets.layout import Dataset, Tasks
 from ..errors import ConfigError
 from .checkpoints import BEST, LAST, SCHEMA, best_generator, load_checkpoint, save_atomically
 from .config import TrainingConfig
-from .dataset import Batch, Dataset, Tasks, make_batch
+from .dataset import Batch, check_trainable, make_batch
 from .distributed import process_group
 from .evaluation import evaluate, trivial_scores
 from .networks import Networks, encode, pick_device
@@ -104,7 +105,7 @@ def train(
     """
     folder = Path(output)
     place = pick_device(device)
-    # check_trainable(dataset)
+    check_trainable(dataset)
     training, validation = dataset.split(config.validation_fraction, config.seed)
     with process_group(place) as group:
         if config.batch_size % group.size:

@@ -1,0 +1,258 @@
+"""The command ``dataset``; none of it needs torch."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from ..errors import ConfigError
+from ..files import write_json
+from ..map_families import FAMILIES
+from .generation import RANGE, RUNS, GenerationSettings, generate
+from .importing import KEEP, described, opened, write_dataset
+from .splits import SPLITS
+
+_HELP = """\
+Training sets: check and split one that is there, make a new one, measure how noisy labels are.
+
+A set is a folder with maps/, tasks/, train.csv and test.csv, as the paper's was published.
+"""
+
+_IMPORT_HELP = """\
+Read a training set, check all of its files, and say what is in it.
+
+PATH is a folder or an archive (.tar.gz, .zip). With --output a clean copy is written, whose lists
+can be made anew: the paper's set is split by task, so that every test map is in training too;
+
+  cbagan-ompl dataset import mpr.tar.gz --output mpr-by-map --split map --copies 10
+
+puts each original map with its ten copies on one side.
+"""
+
+_GENERATE_HELP = """\
+Make a training set: random maps, tasks on them, and as labels the union of many runs of RRT.
+
+  cbagan-ompl dataset generate --output mine --maps 100 --tasks 100 --copies 10
+  cbagan-ompl train mine --output runs/mine
+
+The same seed gives the same files, whatever --jobs (with one version of OMPL).
+"""
+
+_NOISE_HELP = """\
+Label the test tasks of a set anew, several times, and compare the labels.
+
+RRT is random, and so are its labels: how well they agree says how well a network can do at most.
+"""
+
+
+def add_dataset_parser(commands: Any) -> None:
+    """Add the command ``dataset``; the ``run`` defaults take the parsed arguments."""
+    parser = commands.add_parser(
+        "dataset", help="make, import and examine training sets", description=_HELP
+    )
+    actions = parser.add_subparsers(required=True, metavar="ACTION")
+    _add_import(actions)
+    _add_generate(actions)
+    _add_noise(actions)
+
+
+def _action(actions: Any, name: str, help: str, description: str) -> argparse.ArgumentParser:
+    parser: argparse.ArgumentParser = actions.add_parser(
+        name,
+        help=help,
+        description=description,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--json", metavar="FILE", help="write what is printed as JSON")
+    return parser
+
+
+def _add_import(actions: Any) -> None:
+    parser = _action(actions, "import", "check a set, and split it anew", _IMPORT_HELP)
+    parser.set_defaults(run=_import)
+    parser.add_argument("path", metavar="PATH", help="folder or archive")
+    parser.add_argument("--output", metavar="DIR", help="write a copy there")
+    parser.add_argument(
+        "--split",
+        choices=(KEEP, *SPLITS),
+        default=KEEP,
+        help="lists of the copy: as they are, by single tasks, or by original maps (default: keep)",
+    )
+    _add_split_options(parser)
+
+
+def _add_generate(actions: Any) -> None:
+    defaults = GenerationSettings()
+    parser = _action(actions, "generate", "make a set", _GENERATE_HELP)
+    parser.set_defaults(run=_generate)
+    parser.add_argument("--output", required=True, metavar="DIR", help="folder of the set")
+    for name, what in (("maps", "number of maps"), ("tasks", "on each map")):
+        parser.add_argument(
+            f"--{name}",
+            type=int,
+            default=getattr(defaults, name),
+            metavar="N",
+            help=f"{what} (default: {getattr(defaults, name)})",
+        )
+    parser.add_argument(
+        "--size",
+        type=int,
+        default=defaults.size,
+        metavar="N",
+        help=f"side of the maps in pixels; training takes multiples of 16 "
+        f"(default: {defaults.size})",
+    )
+    parser.add_argument(
+        "--families",
+        type=lambda text: tuple(text.split(",")),
+        default=defaults.families,
+        metavar="A,B",
+        help=f"kinds of maps, taken in turn (default: all: {','.join(FAMILIES)})",
+    )
+    parser.add_argument(
+        "--min-distance",
+        type=float,
+        default=defaults.min_distance,
+        metavar="F",
+        help=f"from start to goal, as a share of the side (default: {defaults.min_distance})",
+    )
+    parser.add_argument(
+        "--split",
+        choices=SPLITS,
+        default=defaults.split,
+        help=f"test tasks by original maps, or by single tasks (default: {defaults.split})",
+    )
+    _add_split_options(parser)
+    _add_label_options(parser)
+    parser.add_argument(
+        "--resume", action="store_true", help="go on with a set that was interrupted"
+    )
+
+
+def _add_noise(actions: Any) -> None:
+    parser = _action(actions, "noise", "measure how noisy labels are", _NOISE_HELP)
+    parser.set_defaults(run=_noise)
+    parser.add_argument("dataset", metavar="DATASET", help="folder or archive of a set")
+    parser.add_argument(
+        "--tasks", type=int, metavar="N", help="only N of the test tasks, chosen by the seed"
+    )
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="(default: 0)")
+    _add_label_options(parser)
+
+
+def _add_split_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--copies",
+        type=int,
+        default=1,
+        metavar="N",
+        help="maps from each original, by shift, shear and rotation; 10 in the paper (default: 1)",
+    )
+    parser.add_argument(
+        "--test-fraction",
+        type=float,
+        default=0.2,
+        metavar="F",
+        help="share of the tasks, or of the original maps, for testing (default: 0.2)",
+    )
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="(default: 0)")
+
+
+def _add_label_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--runs",
+        type=int,
+        default=RUNS,
+        metavar="N",
+        help=f"of RRT for each label (default: {RUNS})",
+    )
+    parser.add_argument(
+        "--range",
+        type=float,
+        metavar="R",
+        help=f"longest edge of RRT in pixels (default: the side / {1 / RANGE:g})",
+    )
+    parser.add_argument(
+        "--jobs", type=int, default=1, metavar="N", help="processes at a time (default: 1)"
+    )
+
+
+def _checked_jobs(args: argparse.Namespace) -> int:
+    if args.jobs < 1:
+        raise ConfigError(f"jobs must be at least 1, got {args.jobs}")
+    return int(args.jobs)
+
+
+def _import(args: argparse.Namespace) -> int:
+    with opened(Path(args.path)) as dataset:
+        values = described(dataset)
+        if args.output is not None:
+            write_dataset(
+                Path(args.output), dataset, args.split, args.copies, args.test_fraction, args.seed
+            )
+    print(
+        f"{values['name']}: {values['train_tasks']} tasks for training, {values['test_tasks']} for "
+        f"testing, on {values['maps']} maps of {values['side']} x {values['side']} pixels\n"
+        f"  maps with tasks in both lists:       {values['shared_maps']}\n"
+        f"  test tasks that are in training too: {values['repeated_tasks']}\n"
+        f"  labels that join start and goal:     {values['joined']:.2%}\n"
+        f"  region, share of free space:         {values['region_share']:.1%}\n"
+        f"  tasks with a blocked start or goal:  {values['blocked_ends']}"
+    )
+    if args.output is not None:
+        print(f"copied to {args.output}, split: {args.split}")
+    if args.json is not None:
+        write_json(args.json, values)
+    return 0
+
+
+def _generate(args: argparse.Namespace) -> int:
+    settings = GenerationSettings(
+        maps=args.maps,
+        tasks=args.tasks,
+        size=args.size,
+        families=args.families,
+        copies=args.copies,
+        runs=args.runs,
+        range=args.range,
+        min_distance=args.min_distance,
+        split=args.split,
+        test_fraction=args.test_fraction,
+        seed=args.seed,
+    )
+    try:
+        generate(Path(args.output), settings, _checked_jobs(args), args.resume)
+    except KeyboardInterrupt:
+        print("interrupted; go on with the same command and --resume", file=sys.stderr)
+        return 130
+    print(f"{settings.maps * settings.tasks} tasks written to {args.output}")
+    if args.json is not None:
+        with opened(Path(args.output)) as dataset:
+            write_json(args.json, described(dataset))
+    return 0
+
+
+def _noise(args: argparse.Namespace) -> int:
+    import numpy as np
+
+    from .noise import label_noise
+
+    jobs = _checked_jobs(args)
+    with opened(Path(args.dataset)) as dataset:
+        tasks = dataset.test
+    if args.tasks is not None:
+        if not 1 <= args.tasks <= len(tasks):
+            raise ConfigError(f"tasks must be from 1 to {len(tasks)}, got {args.tasks}")
+        chosen = np.random.default_rng(args.seed).choice(len(tasks), args.tasks, replace=False)
+        tasks = tasks.select(np.sort(chosen))
+    longest_edge = tasks.side * RANGE if args.range is None else args.range
+    values = label_noise(tasks, args.runs, longest_edge, args.seed, jobs)
+    print(f"agreement of labels on {len(tasks)} tasks, {args.runs} runs of RRT each")
+    for name, scores in values.items():
+        if isinstance(scores, dict):
+            print(f"  {name:28} IoU {scores['iou']:.3f}  Dice {scores['dice']:.3f}")
+    if args.json is not None:
+        write_json(args.json, values)
+    return 0

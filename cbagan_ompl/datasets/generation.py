@@ -1,0 +1,216 @@
+"""New training sets: random maps, tasks on them, and the labels of RRT.
+
+What a map, its tasks and their labels are depends on the seed and the number of the map alone, so
+that a set is the same whatever the number of processes and however often it was interrupted (with
+one version of OMPL).
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ConfigError, DatasetError
+from ..files import write_json
+from ..gridmap import GridMap
+from ..map_families import FAMILIES, MIN_SIDE
+from .augmentation import augmented
+from .layout import Tasks
+from .pool import run_all
+from .splits import is_test_task
+from .writing import Row, task_row, write_lists, write_map, write_tasks
+
+RECORD = "dataset.json"
+
+#: The paper's number of runs of RRT for a label.
+RUNS = 50
+#: Limit of each run, in iterations: the paper's.
+ITERATIONS = 5000
+#: Longest edge of RRT as a share of the map's side, one pixel at 64. Of the lengths tried (1/128 to
+#: 12/64) the short ones give labels like the published ones; half of it is twice as slow.
+RANGE = 1 / 64
+
+_MAX_TRIES = 1000
+
+
+@dataclass(frozen=True)
+class GenerationSettings:
+    """What decides a generated set.
+
+    Attributes:
+        maps: number of maps.
+        tasks: on each map.
+        size: side of the maps in pixels.
+        families: names from :data:`cbagan_ompl.map_families.FAMILIES`, taken in turn.
+        copies: maps from each original; the first is the original itself, the others are
+            augmented (10 in the paper).
+        runs: of RRT for each label.
+        range: longest edge of RRT in pixels; None for ``size`` / 64.
+        min_distance: least distance from start to goal as a share of the side.
+        split: see :func:`cbagan_ompl.datasets.splits.is_test_task`.
+        test_fraction: share of the tasks, or of the original maps, for testing.
+        seed: of everything.
+
+    Raises:
+        ConfigError: an option that makes no sense.
+    """
+
+    maps: int = 100
+    tasks: int = 100
+    size: int = 64
+    families: tuple[str, ...] = tuple(FAMILIES)
+    copies: int = 1
+    runs: int = RUNS
+    range: float | None = None
+    min_distance: float = 0.25
+    split: str = "map"
+    test_fraction: float = 0.2
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("maps", "tasks", "copies", "runs"):
+            if getattr(self, name) < 1:
+                raise ConfigError(f"{name} must be at least 1, got {getattr(self, name)}")
+        if self.size < MIN_SIDE:
+            raise ConfigError(f"size must be at least {MIN_SIDE} pixels, got {self.size}")
+        unknown = [name for name in self.families if name not in FAMILIES]
+        if unknown or not self.families:
+            raise ConfigError(
+                f"unknown map family {', '.join(unknown)!r}; there are {', '.join(FAMILIES)}"
+            )
+        if self.range is not None and not 0 < self.range < float("inf"):
+            raise ConfigError(f"range must be above 0, got {self.range}")
+        if not 0 <= self.min_distance < 1:
+            raise ConfigError(
+                f"min_distance is a share of the map's side, from 0 to below 1, "
+                f"got {self.min_distance}"
+            )
+        if self.seed < 0:
+            raise ConfigError(f"seed must be at least 0, got {self.seed}")
+        # Refuses a split that cannot be made before the work is done.
+        is_test_task(self.split, self.originals(), self.test_fraction, self.seed)
+
+    def originals(self) -> NDArray[np.int64]:
+        """For each task the number of its original map, shape (maps * tasks,)."""
+        return (np.arange(self.maps) // self.copies).repeat(self.tasks)
+
+    @property
+    def longest_edge(self) -> float:
+        """Longest edge of RRT in pixels."""
+        return self.size * RANGE if self.range is None else self.range
+
+
+def generate(
+    folder: Path, settings: GenerationSettings, jobs: int, resume: bool, progress: bool = True
+) -> None:
+    """Make a training set.
+
+    Args:
+        folder: where to; made if missing.
+        settings: what kind of set.
+        jobs: processes at a time.
+        resume: go on in a folder where a run was interrupted: only missing maps are made.
+        progress: show a progress bar.
+
+    Raises:
+        ConfigError: ``resume`` with other settings, or without it although the folder holds a set.
+        DatasetError: a file cannot be written, or a map has no task of the wanted distance.
+    """
+    _prepare(folder, settings, resume)
+    missing = [k for k in range(settings.maps) if not _task_list(folder, k).is_file()]
+    run_all(_make_map, [(folder, settings, k) for k in missing], jobs, "maps", progress)
+    rows: list[Row] = [task_row(k, n) for k in range(settings.maps) for n in range(settings.tasks)]
+    test = is_test_task(settings.split, settings.originals(), settings.test_fraction, settings.seed)
+    write_lists(folder, rows, test)
+
+
+def _prepare(folder: Path, settings: GenerationSettings, resume: bool) -> None:
+    from ..planning.compat import ompl_version
+
+    record = folder / RECORD
+    made_by = json.loads(json.dumps({"settings": asdict(settings), "ompl": ompl_version()}))
+    if record.exists():
+        if not resume:
+            raise ConfigError(
+                f"{folder} holds a set already; go on with it (--resume), or choose another folder"
+            )
+        if _read_record(record) != made_by:
+            raise ConfigError(
+                f"{record} was written with other options or another OMPL; go on with the same"
+            )
+        return
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise DatasetError(f"cannot make the folder {folder}: {error.strerror or error}") from error
+    write_json(str(record), made_by)
+
+
+def _read_record(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise DatasetError(f"{path}: cannot read how the set was made ({error})") from error
+
+
+def _task_list(folder: Path, number: int) -> Path:
+    return folder / "tasks" / f"map_{number}.csv"
+
+
+def _make_map(folder: Path, settings: GenerationSettings, number: int) -> None:
+    """Draw a map and its tasks, label them, and write all of it."""
+    free = draw_map(settings, number)
+    grid = GridMap(free)
+    rng = np.random.default_rng((settings.seed, number, 1))
+    drawn = [_draw_task(grid, settings, rng) for _ in range(settings.tasks)]
+    write_map(folder, number, free)
+    tasks = Tasks(
+        free[None].astype(np.uint8),
+        np.zeros(settings.tasks, dtype=np.int64),
+        np.array([ends[0] for ends, _ in drawn], dtype=np.float32),
+        np.array([ends[1] for ends, _ in drawn], dtype=np.float32),
+        np.array([region for _, region in drawn], dtype=np.uint8),
+    )
+    write_tasks(folder, number, tasks)
+
+
+def draw_map(settings: GenerationSettings, number: int) -> NDArray[np.bool_]:
+    """A map of a set, (S, S), true where free.
+
+    Args:
+        settings: of the set.
+        number: of the map, from 0.
+    """
+    original, copy = divmod(number, settings.copies)
+    family = FAMILIES[settings.families[original % len(settings.families)]]
+    rng = np.random.default_rng((settings.seed, original))
+    free = family(rng, settings.size, settings.size)
+    return augmented(free, np.random.default_rng((settings.seed, original, copy))) if copy else free
+
+
+def _draw_task(
+    grid: GridMap, settings: GenerationSettings, rng: np.random.Generator
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Start and goal, (2, 2), and their region; drawn again until RRT finds a path."""
+    from ..planning.labels import rrt_region
+
+    rows, columns = np.nonzero(grid.free)
+    points = (np.stack((columns, rows), axis=-1) + 0.5).astype(np.float64)
+    for _ in range(_MAX_TRIES):
+        ends = points[rng.integers(len(points), size=2)]
+        seed = int(rng.integers(2**32))
+        if np.hypot(*(ends[1] - ends[0])) < max(settings.min_distance * settings.size, 1):
+            continue
+        task = grid.check_task(*ends)
+        region = rrt_region(grid, task, settings.runs, settings.longest_edge, ITERATIONS, seed)
+        if region.any():
+            return ends, region
+    raise DatasetError(
+        f"found no task of at least {settings.min_distance:g} of the side on a map; "
+        "ask for a smaller distance"
+    )

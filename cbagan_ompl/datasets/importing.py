@@ -1,0 +1,169 @@
+"""Sets that others have published: unpacked, checked, and split anew."""
+
+from __future__ import annotations
+
+import tarfile
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ConfigError, DatasetError
+from ..evaluation.metrics import joins
+from .layout import Dataset, Tasks, load_dataset
+from .splits import is_test_task
+from .writing import task_row, write_lists, write_map, write_tasks
+
+KEEP = "keep"
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[Dataset]:
+    """The set in a folder, or in an archive (.tar, .tar.gz, .zip) that holds one folder of it.
+
+    Raises:
+        DatasetError: it cannot be read, see :func:`cbagan_ompl.datasets.layout.load_dataset`.
+    """
+    if path.is_dir():
+        yield load_dataset(path)
+        return
+    with TemporaryDirectory() as folder:
+        _unpack(path, Path(folder))
+        lists = sorted(Path(folder).rglob("train.csv"))
+        if not lists:
+            raise DatasetError(f"{path}: there is no train.csv in the archive")
+        yield load_dataset(lists[0].parent)
+
+
+def _unpack(path: Path, folder: Path) -> None:
+    try:
+        if zipfile.is_zipfile(path):
+            with zipfile.ZipFile(path) as zipped:
+                zipped.extractall(folder)  # leaves out what would lead out of the folder
+            return
+        with tarfile.open(path) as archive:
+            archive.extractall(folder, filter="data")
+    except (OSError, tarfile.TarError, zipfile.BadZipFile, EOFError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise DatasetError(
+            f"{path}: neither a folder nor an archive that can be unpacked ({reason})"
+        ) from error
+
+
+def described(dataset: Dataset) -> dict[str, Any]:
+    """What a set is, for people who think of training with it.
+
+    Returns:
+        Counts of maps and tasks, ``shared_maps`` (those with tasks in both lists: of these the
+        test tells how well a network knows them, not how it does on others),
+        ``repeated_tasks`` (test tasks that are in training as well), ``region_share`` (of free
+        space), ``joined`` (share of the labels in whose free pixels start and goal are joined),
+        ``blocked_ends`` (tasks that start or end in an obstacle).
+    """
+    train, test = dataset.train, dataset.test
+    known = {_key(train, i) for i in range(len(train))}
+    both = (train, test)
+    free = sum(int(tasks.free.sum()) for tasks in both)
+    region = sum(int((tasks.region.astype(bool) & tasks.free).sum()) for tasks in both)
+    return {
+        **dataset.description(),
+        "shared_maps": len(set(train.map_of.tolist()) & set(test.map_of.tolist())),
+        "repeated_tasks": sum(_key(test, i) in known for i in range(len(test))),
+        "region_share": region / free,
+        "joined": float(
+            np.mean([_is_joined(tasks, i) for tasks in both for i in range(len(tasks))])
+        ),
+        "blocked_ends": sum(_is_blocked(tasks, i) for tasks in both for i in range(len(tasks))),
+    }
+
+
+def _key(tasks: Tasks, i: int) -> tuple[int, bytes, bytes]:
+    return int(tasks.map_of[i]), tasks.start[i].tobytes(), tasks.goal[i].tobytes()
+
+
+def _ends(tasks: Tasks, i: int) -> list[tuple[int, int]]:
+    return [(int(end[0]), int(end[1])) for end in (tasks.start[i], tasks.goal[i])]
+
+
+def _is_joined(tasks: Tasks, i: int) -> bool:
+    inside = (tasks.region[i] & tasks.maps[tasks.map_of[i]]).astype(np.bool_)
+    return joins(inside, *_ends(tasks, i))
+
+
+def _is_blocked(tasks: Tasks, i: int) -> bool:
+    free = tasks.maps[tasks.map_of[i]]
+    return not all(free[row, column] for column, row in _ends(tasks, i))
+
+
+def write_dataset(
+    folder: Path,
+    dataset: Dataset,
+    split: str = KEEP,
+    copies: int = 1,
+    test_fraction: float = 0.2,
+    seed: int = 0,
+) -> None:
+    """Write a set in the published layout, its maps and tasks numbered anew.
+
+    Args:
+        folder: where to; must not hold a set yet.
+        dataset: the set.
+        split: ``keep`` for the lists as they are, or see
+            :func:`cbagan_ompl.datasets.splits.is_test_task`.
+        copies: so many maps in a row (by their number) are copies of one original: 10 in the
+            published set. They stay on one side of a split by map.
+        test_fraction: share of the tasks, or of the original maps, for testing.
+        seed: of the split.
+
+    Raises:
+        ConfigError: the folder holds a set, or the split cannot be made.
+        DatasetError: a file cannot be written.
+    """
+    if (folder / "train.csv").exists():
+        raise ConfigError(f"{folder} holds a set already; choose another folder")
+    if copies < 1:
+        raise ConfigError(f"copies must be at least 1, got {copies}")
+    tasks, was_test = _together(dataset)
+    order = np.argsort(tasks.map_of, kind="stable")
+    tasks, was_test = tasks.select(order), was_test[order]
+    is_test = was_test
+    if split != KEEP:
+        is_test = is_test_task(
+            split, _originals(dataset, copies)[tasks.map_of], test_fraction, seed
+        )
+    rows = []
+    for k, free in enumerate(tasks.maps):
+        of_map = tasks.select(np.flatnonzero(tasks.map_of == k))
+        write_map(folder, k, free)
+        write_tasks(folder, k, of_map)
+        rows += [task_row(k, n) for n in range(len(of_map))]
+    write_lists(folder, rows, is_test)
+
+
+def _originals(dataset: Dataset, copies: int) -> NDArray[np.int64]:
+    """The number of the original of each map, (M,)."""
+    if copies == 1:
+        return np.arange(len(dataset.map_numbers))
+    if min(dataset.map_numbers) < 0:
+        raise ConfigError(
+            f"{copies} copies of each original cannot be told: the maps are not called map_K.png"
+        )
+    return np.array(dataset.map_numbers) // copies
+
+
+def _together(dataset: Dataset) -> tuple[Tasks, NDArray[np.bool_]]:
+    """All tasks of a set, and which of them are for testing."""
+    train, test = dataset.train, dataset.test
+    together = Tasks(
+        train.maps,
+        *(
+            np.concatenate((getattr(train, name), getattr(test, name)))
+            for name in ("map_of", "start", "goal", "region")
+        ),
+    )
+    return together, np.repeat((False, True), (len(train), len(test)))

@@ -1,0 +1,232 @@
+"""A training set on disk: maps, start and goal points, and the promising regions between them.
+
+The layout is the one that the (map, point, ROI) set of the paper is published in::
+
+    maps/map_K.png             white free, black blocked
+    tasks/map_K/task_N.png     one blue spot (start) and one red spot (goal) on white
+    tasks/map_K/task_N_roi.png green region on white
+    train.csv, test.csv        columns map, task, roi: the names of the three files of each task
+
+Blue is the start, whatever is said elsewhere: in every published task it is the point that
+``tasks/map_K.csv`` calls the start, and the root of the trees that made the label, which holds it
+in 99.9 % of the tasks (the red point, which a tree need only come near, in 74 %).
+
+All images are squares of one size. They are held in memory as bytes, 80 MB for 10,000 tasks of
+64 x 64 pixels; nothing is written to disk.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import DatasetError
+
+COLUMNS = ("map", "task", "roi")
+DARK = 128
+
+
+@dataclass(frozen=True)
+class Tasks:
+    """Planning tasks with their regions.
+
+    Attributes:
+        maps: (M, S, S) uint8, 1 where free.
+        map_of: (N,) index of the map of each task.
+        start: (N, 2) pixel coordinates (u, v), centre of the spot.
+        goal: (N, 2) the same.
+        region: (N, S, S) uint8, 1 in the region.
+    """
+
+    maps: NDArray[np.uint8]
+    map_of: NDArray[np.int64]
+    start: NDArray[np.float32]
+    goal: NDArray[np.float32]
+    region: NDArray[np.uint8]
+
+    def __len__(self) -> int:
+        return len(self.region)
+
+    @property
+    def side(self) -> int:
+        """Side S of the images in pixels."""
+        return int(self.region.shape[-1])
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """(N, S, S), the map of each task, true where free."""
+        return self.maps[self.map_of].astype(bool)
+
+    def select(self, indices: NDArray[np.int64]) -> Tasks:
+        """Some of the tasks."""
+        return Tasks(
+            self.maps,
+            self.map_of[indices],
+            self.start[indices],
+            self.goal[indices],
+            self.region[indices],
+        )
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """A training set in memory.
+
+    Attributes:
+        name: for records.
+        map_numbers: the number K of each map, from its file name ``map_K.png``; -1 for maps of
+            other names.
+        train: the tasks of ``train.csv``.
+        test: those of ``test.csv``, on the same maps.
+    """
+
+    name: str
+    map_numbers: tuple[int, ...]
+    train: Tasks
+    test: Tasks
+
+    def description(self) -> dict[str, Any]:
+        """What checkpoints and model files say about the data."""
+        return {
+            "name": self.name,
+            "maps": len(self.train.maps),
+            "side": self.train.side,
+            "train_tasks": len(self.train),
+            "test_tasks": len(self.test),
+        }
+
+    def split(self, fraction: float, seed: int) -> tuple[Tasks, Tasks]:
+        """The training tasks in two random parts: for training, and for validation.
+
+        Args:
+            fraction: share of the tasks for validation, at least one task.
+            seed: the same seed gives the same parts.
+
+        Raises:
+            DatasetError: there are too few tasks to split.
+        """
+        if len(self.train) < 3:
+            raise DatasetError(f"{self.name}: train.csv lists fewer than three tasks")
+        order = np.random.default_rng(seed).permutation(len(self.train))
+        held_back = min(max(1, round(fraction * len(order))), len(order) - 2)
+        return self.train.select(np.sort(order[held_back:])), self.train.select(
+            np.sort(order[:held_back])
+        )
+
+
+def load_dataset(folder: str | PathLike[str]) -> Dataset:
+    """Read a training set.
+
+    Args:
+        folder: the folder that holds ``train.csv``.
+
+    Raises:
+        DatasetError: a file is missing or unreadable, a column is missing, a list is empty, an
+            image differs in size from the first map, or a task has no start or goal spot.
+    """
+    root = Path(folder)
+    if not root.is_dir():
+        raise DatasetError(f"{root}: no such folder; give the folder that holds train.csv")
+    rows = {name: _read_rows(root / f"{name}.csv") for name in ("train", "test")}
+    names = sorted({row["map"] for part in rows.values() for row in part}, key=_map_number)
+    maps = _read_maps(root, names)
+    number = {name: i for i, name in enumerate(names)}
+    parts = {name: _read_tasks(root, part, maps, number) for name, part in rows.items()}
+    numbers = tuple(_map_number(name)[0] for name in names)
+    return Dataset(root.resolve().name, numbers, parts["train"], parts["test"])
+
+
+def _map_number(name: str) -> tuple[int, str]:
+    """K of ``map_K.png``, and the name itself to tell other names apart."""
+    match = re.fullmatch(r"map_(\d+)", Path(name).stem)
+    return int(match[1]) if match else -1, name
+
+
+def _read_rows(path: Path) -> list[dict[str, str]]:
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            reader = csv.DictReader(file)
+            missing = set(COLUMNS) - set(reader.fieldnames or ())
+            rows = list(reader)
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise DatasetError(f"{path}: cannot read the list of tasks ({error})") from error
+    if missing:
+        raise DatasetError(
+            f"{path}: column {', '.join(sorted(missing))} is missing; "
+            f"the columns are {', '.join(COLUMNS)}"
+        )
+    if not rows or any(not row[column] for row in rows for column in COLUMNS):
+        raise DatasetError(f"{path}: the list is empty, or a line has an empty or missing cell")
+    return rows
+
+
+def _read_maps(root: Path, names: list[str]) -> NDArray[np.uint8]:
+    images = [_read_image(root / "maps" / name) for name in names]
+    side = images[0].shape[0]
+    if images[0].shape[1] != side:
+        raise DatasetError(
+            f"{root}: the images of a training set are squares; {names[0]} has "
+            f"{images[0].shape[1]} x {side} pixels"
+        )
+    for name, image in zip(names, images, strict=True):
+        _check_size(root / "maps" / name, image, side)
+    return np.stack([(image[..., 0] >= DARK).astype(np.uint8) for image in images])
+
+
+def _read_tasks(
+    root: Path, rows: list[dict[str, str]], maps: NDArray[np.uint8], number: dict[str, int]
+) -> Tasks:
+    side = maps.shape[-1]
+    ends = np.empty((len(rows), 2, 2), dtype=np.float32)
+    region = np.empty((len(rows), side, side), dtype=np.uint8)
+    for i, row in enumerate(rows):
+        folder = root / "tasks" / Path(row["map"]).stem
+        image = _read_image(folder / row["task"])
+        _check_size(folder / row["task"], image, side)
+        ends[i] = _find_ends(folder / row["task"], image)
+        image = _read_image(folder / row["roi"])
+        _check_size(folder / row["roi"], image, side)
+        region[i] = (image[..., 1] >= DARK) & (image[..., 0] < DARK)
+    map_of = np.array([number[row["map"]] for row in rows], dtype=np.int64)
+    return Tasks(maps, map_of, ends[:, 0].copy(), ends[:, 1].copy(), region)
+
+
+def _read_image(path: Path) -> NDArray[np.uint8]:
+    """An image as (H, W, 3), red, green, blue."""
+    # imread itself would print a warning for a missing file, and cannot open every path.
+    try:
+        data = np.frombuffer(path.read_bytes(), dtype=np.uint8)
+    except OSError as error:
+        raise DatasetError(f"{path}: cannot read the image ({error.strerror})") from error
+    image = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
+    if image is None:
+        raise DatasetError(f"{path}: not an image, or a damaged one")
+    return np.asarray(image[..., ::-1], dtype=np.uint8)
+
+
+def _check_size(path: Path, image: NDArray[np.uint8], side: int) -> None:
+    if image.shape[:2] != (side, side):
+        raise DatasetError(
+            f"{path}: {image.shape[1]} x {image.shape[0]} pixels, "
+            f"but the first map has {side} x {side}"
+        )
+
+
+def _find_ends(path: Path, image: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """Centres of the start's and the goal's spot as pixel coordinates (u, v), shape (2, 2)."""
+    red, blue = image[..., 0] >= DARK, image[..., 2] >= DARK
+    centres = []
+    for role, colour, spot in (("start", "blue", blue & ~red), ("goal", "red", red & ~blue)):
+        rows, columns = np.nonzero(spot)
+        if not rows.size:
+            raise DatasetError(f"{path}: no {colour} pixel, the {role} is missing")
+        centres.append((columns.mean() + 0.5, rows.mean() + 0.5))
+    return np.array(centres, dtype=np.float32)

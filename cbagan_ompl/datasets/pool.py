@@ -1,0 +1,56 @@
+"""The same work on many things, in several processes, with a progress bar."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import active_children, get_context
+from typing import Any, TypeVar
+
+from tqdm import tqdm
+
+T = TypeVar("T")
+
+
+def run_all(
+    work: Callable[..., T],
+    arguments: Sequence[tuple[Any, ...]],
+    processes: int,
+    unit: str,
+    progress: bool = True,
+) -> list[T]:
+    """Results of ``work(*args)`` for each of the arguments, in their order.
+
+    Args:
+        work: a function of a module.
+        arguments: of each call.
+        processes: at a time.
+        unit: what the progress bar counts.
+        progress: show the progress bar.
+
+    Raises:
+        KeyboardInterrupt: after an interrupt; calls that have begun are given up.
+        Exception: what a call raised.
+    """
+    results: dict[int, T] = {}
+    others = set(active_children())
+    # Forked from a clean server: OMPL and OpenCV have threads, which a fork does not survive.
+    context = get_context("forkserver")
+    with ProcessPoolExecutor(processes, context, _ignore_interrupts) as pool:
+        places = {pool.submit(work, *args): i for i, args in enumerate(arguments)}
+        try:
+            done = as_completed(places)
+            for future in tqdm(done, total=len(places), unit=f" {unit}", disable=not progress):
+                results[places[future]] = future.result()
+        except BaseException:
+            for child in set(active_children()) - others:
+                child.terminate()
+            pool.shutdown(cancel_futures=True)
+            raise
+    return [results[i] for i in range(len(arguments))]
+
+
+def _ignore_interrupts() -> None:
+    """An interrupt from the terminal is for the parent alone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
