@@ -14,6 +14,7 @@ from .benchmarking.cli import add_benchmark_parser
 from .datasets.cli import add_dataset_parser
 from .draws import DEFAULT_UNIFORM_FRACTION
 from .errors import CbaganOmplError, ConfigError
+from .evaluation.cli import add_evaluate_parser
 from .files import write_json
 from .gridmap import GridMap
 from .heatmap import Heatmap
@@ -80,6 +81,7 @@ def _parser() -> argparse.ArgumentParser:
     add_dataset_parser(commands)
     add_train_parser(commands)
     add_export_parser(commands)
+    add_evaluate_parser(commands)
     return parser
 
 

@@ -86,8 +86,9 @@ def _key(tasks: Tasks, i: int) -> tuple[int, bytes, bytes]:
     return int(tasks.map_of[i]), tasks.start[i].tobytes(), tasks.goal[i].tobytes()
 
 
-def _ends(tasks: Tasks, i: int) -> list[tuple[int, int]]:
-    return [(int(end[0]), int(end[1])) for end in (tasks.start[i], tasks.goal[i])]
+def _ends(tasks: Tasks, i: int) -> tuple[tuple[int, int], tuple[int, int]]:
+    (u, v), (x, y) = (end[i].astype(int).tolist() for end in (tasks.start, tasks.goal))
+    return (u, v), (x, y)
 
 
 def _is_joined(tasks: Tasks, i: int) -> bool:

@@ -144,6 +144,20 @@ def load_dataset(folder: str | PathLike[str]) -> Dataset:
     return Dataset(root.resolve().name, numbers, parts["train"], parts["test"])
 
 
+def label_files(folder: str | PathLike[str], part: str) -> list[Path]:
+    """The label of each task of ``train.csv`` or ``test.csv``, in the order of the tasks.
+
+    Args:
+        folder: of the set.
+        part: ``train`` or ``test``.
+    """
+    root = Path(folder)
+    return [
+        root / "tasks" / Path(row["map"]).stem / row["roi"]
+        for row in _read_rows(root / f"{part}.csv")
+    ]
+
+
 def _map_number(name: str) -> tuple[int, str]:
     """K of ``map_K.png``, and the name itself to tell other names apart."""
     match = re.fullmatch(r"map_(\d+)", Path(name).stem)
@@ -169,7 +183,7 @@ def _read_rows(path: Path) -> list[dict[str, str]]:
 
 
 def _read_maps(root: Path, names: list[str]) -> NDArray[np.uint8]:
-    images = [_read_image(root / "maps" / name) for name in names]
+    images = [read_image(root / "maps" / name) for name in names]
     side = images[0].shape[0]
     if images[0].shape[1] != side:
         raise DatasetError(
@@ -189,18 +203,22 @@ def _read_tasks(
     region = np.empty((len(rows), side, side), dtype=np.uint8)
     for i, row in enumerate(rows):
         folder = root / "tasks" / Path(row["map"]).stem
-        image = _read_image(folder / row["task"])
+        image = read_image(folder / row["task"])
         _check_size(folder / row["task"], image, side)
         ends[i] = _find_ends(folder / row["task"], image)
-        image = _read_image(folder / row["roi"])
+        image = read_image(folder / row["roi"])
         _check_size(folder / row["roi"], image, side)
         region[i] = (image[..., 1] >= DARK) & (image[..., 0] < DARK)
     map_of = np.array([number[row["map"]] for row in rows], dtype=np.int64)
     return Tasks(maps, map_of, ends[:, 0].copy(), ends[:, 1].copy(), region)
 
 
-def _read_image(path: Path) -> NDArray[np.uint8]:
-    """An image as (H, W, 3), red, green, blue."""
+def read_image(path: Path) -> NDArray[np.uint8]:
+    """An image as (H, W, 3), red, green, blue.
+
+    Raises:
+        DatasetError: it is missing, or no image.
+    """
     # imread itself would print a warning for a missing file, and cannot open every path.
     try:
         data = np.frombuffer(path.read_bytes(), dtype=np.uint8)

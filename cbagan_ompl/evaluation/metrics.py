@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 
 class Confusion(NamedTuple):
-    """Pixel counts, one of each an image, or scalars for a pool of images."""
+    """Pixel counts, one of each an image, or for a pool of images, there weighted sums as well."""
 
-    true_positive: NDArray[np.int64]
-    false_positive: NDArray[np.int64]
-    false_negative: NDArray[np.int64]
+    true_positive: NDArray[Any]
+    false_positive: NDArray[Any]
+    false_negative: NDArray[Any]
 
     def pooled(self) -> Confusion:
         """The counts over all images."""
@@ -53,25 +53,98 @@ def confusion(predicted: NDArray[np.bool_], truth: NDArray[np.bool_]) -> Confusi
     Returns:
         Counts of shape (N,).
     """
-
-    def count(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
-        return np.asarray(np.count_nonzero(mask, axis=(1, 2)), dtype=np.int64)
-
-    return Confusion(count(predicted & truth), count(predicted & ~truth), count(~predicted & truth))
+    return Confusion(
+        _count(predicted & truth), _count(predicted & ~truth), _count(~predicted & truth)
+    )
 
 
-def joins(region: NDArray[np.bool_], start: tuple[int, int], goal: tuple[int, int]) -> bool:
-    """Whether one 8-connected part of the region holds both start and goal.
+def joins(
+    region: NDArray[np.bool_], start: tuple[int, int], goal: tuple[int, int], connectivity: int = 8
+) -> bool:
+    """Whether one connected part of the region holds both start and goal.
 
     Args:
         region: (H, W), true inside; what is no free space must be false already.
         start: pixel (column, row). Start and goal count as part of the region.
         goal: pixel (column, row).
+        connectivity: 8 or 4 neighbours.
     """
     mask = region.astype(np.uint8)
     mask[start[1], start[0]] = mask[goal[1], goal[0]] = 1
-    labels = cv2.connectedComponents(mask, connectivity=8)[1]
+    labels = cv2.connectedComponents(mask, connectivity=connectivity)[1]
     return bool(labels[start[1], start[0]] == labels[goal[1], goal[0]])
+
+
+class TaskScores(NamedTuple):
+    """What is known of the prediction of each of N tasks, arrays of shape (N,).
+
+    Attributes:
+        counts: pixels of each kind.
+        joined: whether start and goal are joined inside region and free space, 8-connected.
+        joined_4: the same, 4-connected.
+        area: pixels of the region in free space.
+        free: pixels of free space.
+    """
+
+    counts: Confusion
+    joined: NDArray[np.bool_]
+    joined_4: NDArray[np.bool_]
+    area: NDArray[np.int64]
+    free: NDArray[np.int64]
+
+    def means(self, weights: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+        """All scores, each task weighing as often as it is counted.
+
+        Args:
+            weights: (..., N).
+
+        Returns:
+            ``iou``, ``dice``, ``precision`` and ``recall`` over the pixels of all images, the same
+            with suffix ``_per_image`` as means over images, ``connectivity`` and
+            ``connectivity_4``, the share of tasks whose start and goal are joined, and ``area``,
+            the share of free space that the region takes; of shape (...) each.
+        """
+        pooled = Confusion(*(weights @ counts for counts in self.counts))
+        scores = {}
+        for name in ("iou", "dice", "precision", "recall"):
+            scores[name] = getattr(pooled, name)()
+            scores[f"{name}_per_image"] = _mean(getattr(self.counts, name)(), weights)
+        scores["connectivity"] = _mean(self.joined, weights)
+        scores["connectivity_4"] = _mean(self.joined_4, weights)
+        scores["area"] = (weights @ self.area) / (weights @ self.free)
+        return scores
+
+
+def task_scores(
+    predicted: NDArray[np.bool_],
+    truth: NDArray[np.bool_],
+    free: NDArray[np.bool_],
+    start: NDArray[np.floating[Any]],
+    goal: NDArray[np.floating[Any]],
+) -> TaskScores:
+    """Compare predicted regions with the true ones.
+
+    Args:
+        predicted: (N, H, W), true in the predicted region.
+        truth: (N, H, W), true in the true region.
+        free: (N, H, W), true in free space.
+        start: (N, 2), pixel coordinates (u, v).
+        goal: (N, 2), the same.
+    """
+    inside = predicted & free
+    ends = [
+        ((s[0], s[1]), (g[0], g[1]))
+        for s, g in zip(start.astype(int).tolist(), goal.astype(int).tolist(), strict=True)
+    ]
+
+    def joined(connectivity: int) -> NDArray[np.bool_]:
+        return np.array(
+            [joins(mask, *pair, connectivity) for mask, pair in zip(inside, ends, strict=True)]
+        )
+
+    return TaskScores(
+        confusion(predicted, truth), joined(8), joined(4), _count(inside), _count(free)
+    )
 
 
 def region_scores(
@@ -81,35 +154,23 @@ def region_scores(
     start: NDArray[np.floating[Any]],
     goal: NDArray[np.floating[Any]],
 ) -> dict[str, float]:
-    """All scores of predicted regions.
-
-    Args:
-        predicted: (N, H, W), true in the predicted region.
-        truth: (N, H, W), true in the true region.
-        free: (N, H, W), true in free space.
-        start: (N, 2), pixel coordinates (u, v).
-        goal: (N, 2), the same.
+    """All scores of predicted regions; arguments as for :func:`task_scores`.
 
     Returns:
-        ``iou``, ``dice``, ``precision`` and ``recall`` over the pixels of all images,
-        the same with suffix ``_per_image`` as means over images, and ``connectivity``, the share
-        of tasks whose start and goal are joined inside region and free space.
+        See :meth:`TaskScores.means`.
     """
-    counts = confusion(predicted, truth)
-    pooled = counts.pooled()
-    scores: dict[str, float] = {}
-    for name in ("iou", "dice", "precision", "recall"):
-        scores[name] = float(getattr(pooled, name)())
-        scores[f"{name}_per_image"] = float(getattr(counts, name)().mean())
-    ends = zip(start.astype(int).tolist(), goal.astype(int).tolist(), strict=True)
-    joined = [
-        joins(region, (s[0], s[1]), (g[0], g[1]))
-        for region, (s, g) in zip(predicted & free, ends, strict=True)
-    ]
-    scores["connectivity"] = float(np.mean(joined))
-    return scores
+    scores = task_scores(predicted, truth, free, start, goal).means(np.ones(len(truth)))
+    return {name: float(value) for name, value in scores.items()}
 
 
-def _ratio(part: NDArray[np.int64], whole: NDArray[np.int64]) -> NDArray[np.float64]:
+def _count(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
+    return np.asarray(np.count_nonzero(mask, axis=(1, 2)), dtype=np.int64)
+
+
+def _mean(values: NDArray[Any], weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray((weights @ values) / weights.sum(axis=-1), dtype=np.float64)
+
+
+def _ratio(part: NDArray[Any], whole: NDArray[Any]) -> NDArray[np.float64]:
     # Nothing predicted scores 0, also where there was nothing to find.
     return np.asarray(part / np.maximum(whole, 1), dtype=np.float64)

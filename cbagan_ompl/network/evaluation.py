@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import cv2
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -12,15 +11,13 @@ from torch import nn
 
 from ..datasets.layout import Tasks
 from ..evaluation.metrics import region_scores
+from ..evaluation.predictions import trivial_predictions
 from .dataset import make_batch
 from .encoding import region_probability
 from .networks import encode
 
 #: A predicted probability from here on counts as region.
 THRESHOLD = 0.5
-
-#: Half the width in pixels of the straight line that predictions are compared with.
-LINE_HALF_WIDTH = 3
 
 
 def evaluate(
@@ -47,13 +44,7 @@ def _predict(
 def trivial_scores(tasks: Tasks) -> dict[str, dict[str, float]]:
     """Scores of two predictors that know nothing: all free space, and a straight band."""
     truth, free = tasks.region.astype(bool), tasks.free
-    bands = np.zeros_like(tasks.region)
-    for band, start, goal in zip(bands, tasks.start, tasks.goal, strict=True):
-        ends = np.floor((start, goal)).astype(int).tolist()
-        cv2.line(band, ends[0], ends[1], 1, thickness=2 * LINE_HALF_WIDTH + 1)
     return {
-        "all free space": region_scores(free, truth, free, tasks.start, tasks.goal),
-        "straight line": region_scores(
-            bands.astype(bool) & free, truth, free, tasks.start, tasks.goal
-        ),
+        name: region_scores(predicted, truth, free, tasks.start, tasks.goal)
+        for name, predicted in trivial_predictions(tasks).items()
     }

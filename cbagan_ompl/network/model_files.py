@@ -7,11 +7,16 @@ from __future__ import annotations
 
 import hashlib
 import json
+import warnings
 import zipfile
+from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import ModelError
+
+if TYPE_CHECKING:
+    import torch
 
 MANIFEST = "manifest.json"
 
@@ -86,6 +91,21 @@ def read_record(path: Path) -> dict[str, Any]:
     if text is None:
         raise ModelError(_no_record(path, names))
     return _parse_record(path, text)
+
+
+def load_script(path: str | PathLike[str]) -> torch.nn.Module:
+    """Load a TorchScript file; torch must be installed.
+
+    Raises:
+        Exception: of many types, for damaged and for foreign files.
+    """
+    import torch
+
+    with warnings.catch_warnings():
+        # TorchScript is deprecated, see export.save_script.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        module: torch.nn.Module = torch.jit.load(str(path), map_location="cpu")  # type: ignore[no-untyped-call]
+    return module
 
 
 def _check_readable(path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +14,7 @@ from ..errors import ModelError
 from ..gridmap import GridMap
 from ..heatmap import Heatmap
 from . import require_torch
-from .model_files import bundled_model, read_record
+from .model_files import bundled_model, load_script, read_record
 
 if TYPE_CHECKING:
     import torch
@@ -38,15 +37,10 @@ def load_model(path: str | PathLike[str] | None = None) -> Predictor:
         ModelError: the file is missing, no exported model, damaged, or of a newer version.
     """
     require_torch()
-    import torch
-
     source = bundled_model() if path is None else Path(path)
     record = read_record(source)
     try:
-        with warnings.catch_warnings():
-            # See export.save_script.
-            warnings.simplefilter("ignore", DeprecationWarning)
-            module = torch.jit.load(str(source), map_location="cpu")  # type: ignore[no-untyped-call]
+        module = load_script(source)
     except Exception as error:  # torch raises many types for damaged archives
         raise ModelError(
             f"{source}: torch cannot load the model ({type(error).__name__}), the file is "
@@ -93,27 +87,38 @@ class Predictor:
         ends = grid.to_pixel(grid.check_task(start, goal))
         shape = scaled_shape(grid.shape, int(self.record["working_size"]))
         scaled_ends = ends * (shape[1] / grid.width, shape[0] / grid.height)
-        values = self._run(scaled_free(grid.free, shape), scaled_ends)
+        values = self.probabilities(scaled_free(grid.free, shape)[None], *scaled_ends[:, None])[0]
         full = cv2.resize(values, grid.shape[::-1], interpolation=cv2.INTER_LINEAR)
         heatmap = Heatmap(np.clip(full, _FLOOR, 1), grid)
         return heatmap.joined(start, goal) if repair else heatmap
 
-    def _run(self, free: NDArray[np.bool_], ends: NDArray[np.float64]) -> NDArray[np.float32]:
-        """The region probability, (H, W), of a map at working size with its start and goal."""
+    def probabilities(
+        self, free: NDArray[np.bool_], start: NDArray[np.floating], goal: NDArray[np.floating]
+    ) -> NDArray[np.float32]:
+        """What the network says of maps at the size they have, without scaling or repair.
+
+        Args:
+            free: (B, H, W), true where free.
+            start: (B, 2), pixel coordinates (u, v).
+            goal: (B, 2), the same.
+
+        Returns:
+            (B, H, W), the probability that a pixel belongs to the region.
+        """
         import torch
         from torch.jit import optimized_execution  # type: ignore[attr-defined]
 
-        cells = torch.from_numpy(free.astype(np.float32))[None, None]
-        points = torch.from_numpy(ends.astype(np.float32))
+        cells = torch.from_numpy(free.astype(np.float32))[:, None]
+        ends = (torch.from_numpy(points.astype(np.float32)) for points in (start, goal))
         threads = torch.get_num_threads()
         torch.set_num_threads(self.inference_threads)
         try:
             # Without the optimiser, whose first two calls take ten times as long: a plan makes one.
             with torch.inference_mode(), optimized_execution(False):
-                values = self._module(cells, points[:1], points[1:])
+                values = self._module(cells, *ends)
         finally:
             torch.set_num_threads(threads)
-        result: NDArray[np.float32] = values[0, 0].numpy()
+        result: NDArray[np.float32] = values[:, 0].numpy()
         return result
 
     def __repr__(self) -> str:
