@@ -18,6 +18,7 @@ from .evaluation.cli import add_evaluate_parser
 from .files import write_json
 from .gridmap import GridMap
 from .heatmap import Heatmap
+from .map_options import add_map_options, map_options
 from .mapfiles import bundled_maps
 from .network.cli import add_export_parser, add_train_parser
 from .tasks import tasks_of
@@ -108,17 +109,7 @@ def _add_plan_parser(commands: Any) -> None:
     task.add_argument(
         "--radius", type=float, default=0.0, metavar="R", help="radius of the robot (default: 0)"
     )
-    task.add_argument(
-        "--threshold",
-        type=float,
-        metavar="T",
-        help="for images: how bright a free pixel is at least, 0 to 1 (default: 0.5)",
-    )
-    task.add_argument(
-        "--unknown-is-free",
-        action="store_true",
-        help="for ROS maps: plan through unknown space (default: it is blocked)",
-    )
+    add_map_options(task)
 
     planner = parser.add_argument_group("planner")
     planner.add_argument(
@@ -180,10 +171,7 @@ def _plan(args: argparse.Namespace) -> int:
     for path in (args.output, args.json):
         if path is not None and not Path(path).parent.is_dir():
             raise ConfigError(f"cannot write {path}: its folder does not exist")
-    options: dict[str, Any] = {"unknown_is_free": args.unknown_is_free}
-    if args.threshold is not None:
-        options["threshold"] = args.threshold
-    grid = GridMap.load(args.map, **options)
+    grid = GridMap.load(args.map, **map_options(args))
     start, goal = _ends(args, grid)
     result = plan(
         grid,

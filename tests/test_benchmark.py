@@ -322,6 +322,10 @@ def test_unreached_planners_run_with_their_own_sampler_only(two_walls: GridMap) 
         (["--set", "RRT.range"], "PLANNER.parameter=value"),
         (["--set", "PRM.range=1"], "not among the planners"),
         (["--tasks", "missing.csv"], "missing.csv"),
+        (["--model", "uniform=x.pt"], "cannot be called uniform"),
+        (["--model", "x.pt"], "the learned sampler is not among the samplers"),
+        (["--model", "peer=x.pt"], "x.pt: no such file"),
+        (["--threshold", "7"], "threshold"),
         (["--heatmap-dir", "peer=."], "no heat map of the task: neither maze_0.npy"),
     ],
 )

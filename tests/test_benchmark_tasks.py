@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import cv2
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 from conftest import GOAL, START
 
-from cbagan_ompl import ConfigError, GridMap, Heatmap, HeatmapError, Task, TaskError
+from cbagan_ompl import ConfigError, GridMap, Heatmap, HeatmapError, MapError, Task, TaskError
 from cbagan_ompl.benchmarking.logs import parse_log
 from cbagan_ompl.benchmarking.selection import (
     BenchmarkTask,
@@ -92,6 +93,34 @@ def test_heat_maps_of_others(two_walls: GridMap, corridor: Heatmap, tmp_path: Pa
     ]
     assert int(log.planners[1].runs[0]["learned draws INTEGER"]) > 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["two_walls_0.png", "x.log"]
+
+
+def test_several_models_side_by_side(tmp_path: Path) -> None:
+    pytest.importorskip("torch")
+    from cbagan_ompl.network.model_files import bundled_model
+
+    copy = shutil.copy(bundled_model(), tmp_path / "copy.pt")
+    words = ["benchmark", "bundled:maze", "--tasks-per-map", "1", "--planners", "RRT"]
+    words += ["--samplers", "uniform,learned", "--model", f"copy={copy}", "--runs", "1"]
+    assert main([*words, "--range", "20", "--output", str(tmp_path / "out")]) == 0
+    log = parse_log((tmp_path / "out" / "logs" / "maze_0.log").read_text())
+    assert [planner.name.rsplit("_")[-1] for planner in log.planners] == [
+        "uniform",
+        "learned",
+        "copy",
+    ]
+    for planner in log.planners[1:]:
+        assert int(planner.runs[0]["learned draws INTEGER"]) > 0
+        assert float(planner.runs[0]["inference time REAL"]) > 0
+
+
+def test_options_of_maps(tmp_path: Path) -> None:
+    path = tmp_path / "gray.png"
+    cv2.imwrite(str(path), np.full((20, 20), 100, np.uint8))
+    options = {"threshold": 0.3, "unknown_is_free": False}
+    assert select_tasks([str(path)], tasks_per_map=1, map_options=options)[0].grid.free.all()
+    with pytest.raises(MapError, match=r"threshold 0\.5"):
+        select_tasks([str(path)], tasks_per_map=1)
 
 
 def test_arguments_can_be_kept_in_a_file(

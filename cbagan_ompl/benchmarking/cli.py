@@ -11,8 +11,9 @@ from typing import Any
 
 from ..draws import DEFAULT_UNIFORM_FRACTION
 from ..errors import ConfigError
+from ..map_options import add_map_options, map_options
 from ..mapfiles import bundled_maps
-from .settings import Settings, parse_parameters
+from .settings import LEARNED, Settings, parse_parameters
 
 _HELP = """\
 Compare samplers in OMPL's own planners, with OMPL's Benchmark, on the same tasks.
@@ -61,6 +62,7 @@ def add_benchmark_parser(commands: Any) -> None:
     tasks.add_argument(
         "--radius", type=float, default=0.0, metavar="R", help="radius of the robot (default: 0)"
     )
+    add_map_options(tasks)
 
     contest = parser.add_argument_group("what is compared")
     contest.add_argument(
@@ -87,7 +89,15 @@ def add_benchmark_parser(commands: Any) -> None:
         help="a further sampler NAME, which draws from heat maps of any origin: "
         "DIR/MAP_N.npy or .png for task N of each map, from 0; may be repeated",
     )
-    contest.add_argument("--model", metavar="FILE", help="exported model (default: the bundled)")
+    contest.add_argument(
+        "--model",
+        action="append",
+        default=[],
+        type=_model,
+        metavar="[NAME=]FILE",
+        help="exported model of the learned sampler (default: the bundled one); with a name, a "
+        "further sampler NAME that draws from this model; may be repeated",
+    )
     contest.add_argument(
         "--uniform-fraction",
         type=float,
@@ -154,6 +164,11 @@ def _named_folder(text: str) -> tuple[str, str]:
     return name, folder
 
 
+def _model(text: str) -> tuple[str, str]:
+    name, equals, file = text.partition("=")
+    return (name, file) if equals and not Path(text).exists() else (LEARNED, text)
+
+
 def _cores() -> int:
     return len(os.sched_getaffinity(0))
 
@@ -169,21 +184,28 @@ def _benchmark(args: argparse.Namespace) -> int:
             f"warning: {args.jobs} jobs share {_cores()} cores, all times will be too long",
             file=sys.stderr,
         )
-    folders = dict(args.heatmap_dir)
+    folders, models = dict(args.heatmap_dir), dict(args.model)
+    further = [name for name in models if name not in args.samplers]
+    if LEARNED in further:
+        raise ConfigError(
+            f"--model {models[LEARNED]}: the learned sampler is not among the samplers"
+        )
     settings = Settings(
         planners=args.planners,
-        samplers=(*args.samplers, *folders),
+        samplers=(*args.samplers, *further, *folders),
         runs=args.runs,
         time=args.time,
         range=args.range,
         parameters=parse_parameters(args.set),
         uniform_fraction=args.uniform_fraction,
-        model=args.model,
+        models=models,
         heatmap_dirs=folders,
         radius=args.radius,
         seed=args.seed,
     )
-    tasks = select_tasks(args.maps, args.tasks, args.tasks_per_map, args.radius, args.seed)
+    tasks = select_tasks(
+        args.maps, args.tasks, args.tasks_per_map, args.radius, args.seed, map_options(args)
+    )
     benchmark = Benchmark(tasks, settings, Path(args.output), args.resume)
     failures = benchmark.run(args.jobs)
     logs = benchmark.finished_logs()

@@ -15,6 +15,7 @@ from typing import cast
 
 from tqdm import tqdm
 
+from .settings import LEARNED
 from .worker import Job, run_job
 
 # Imported once, by the server that the processes are forked from.
@@ -92,7 +93,7 @@ class _Running:
 
     def __init__(self, job: Job, folder: Path) -> None:
         context = get_context("forkserver")
-        learned = "learned" in job.settings.samplers
+        learned = LEARNED in job.settings.samplers or job.settings.models
         context.set_forkserver_preload([*_PRELOAD, *(_PRELOAD_LEARNED if learned else ())])
         self.job = job
         self.rounds_left = job.settings.runs

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from zlib import crc32
 
 import numpy as np
@@ -48,6 +49,7 @@ def select_tasks(
     tasks_per_map: int | None = None,
     radius: float = 0.0,
     seed: int = 0,
+    map_options: Mapping[str, Any] | None = None,
 ) -> list[BenchmarkTask]:
     """The tasks on some maps.
 
@@ -60,6 +62,7 @@ def select_tasks(
             random ones for a map that comes with none.
         radius: of the robot, world units.
         seed: of random tasks.
+        map_options: of :meth:`GridMap.load`.
 
     Raises:
         MapError: a map or task file that cannot be used.
@@ -70,7 +73,7 @@ def select_tasks(
         raise ConfigError(f"tasks per map must be at least 1, got {tasks_per_map}")
     selected = []
     for path in maps or [BUNDLED + name for name in bundled_maps()]:
-        grid = GridMap.load(path).inflated(radius)
+        grid = GridMap.load(path, **(map_options or {})).inflated(radius)
         given = tasks_of(path, grid) if tasks is None else load_tasks(tasks, grid)
         if not given:
             given = random_tasks(grid, tasks_per_map or _RANDOM_TASKS, seed)

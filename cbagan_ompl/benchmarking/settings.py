@@ -17,6 +17,9 @@ from ..errors import ConfigError
 #: OMPL's own sampler, which the others are compared with.
 BASELINE = "uniform"
 
+#: The sampler of the bundled model, unless another one is given.
+LEARNED = "learned"
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -24,14 +27,16 @@ class Settings:
 
     Attributes:
         planners: OMPL's names.
-        samplers: of :data:`cbagan_ompl.planning.plan.SAMPLERS`, and the keys of ``heatmap_dirs``.
+        samplers: of :data:`cbagan_ompl.planning.plan.SAMPLERS`, and the keys of ``models`` and of
+            ``heatmap_dirs``.
         runs: of each planner with each sampler on each task.
         time: limit of a run, seconds.
         range: longest edge of the planners that have this parameter, world units; by default
             OMPL's choice (a fifth of the map's diagonal).
         parameters: for some planners ``{parameter: value}``.
         uniform_fraction: share of draws that stays uniform over free space, in (0, 1].
-        model: file of the learned sampler's model; the bundled one by default.
+        models: for some samplers the file of the model that they draw from; the bundled one for
+            ``learned`` by default.
         heatmap_dirs: for some samplers the folder of their heat maps, one for each task.
         radius: of the robot, world units.
         seed: at least 0.
@@ -41,13 +46,13 @@ class Settings:
     """
 
     planners: tuple[str, ...] = ("RRT", "RRTstar", "InformedRRTstar")
-    samplers: tuple[str, ...] = (BASELINE, "learned", "corridor")
+    samplers: tuple[str, ...] = (BASELINE, LEARNED, "corridor")
     runs: int = 5
     time: float = 0.4
     range: float | None = None
     parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     uniform_fraction: float = DEFAULT_UNIFORM_FRACTION
-    model: str | None = None
+    models: Mapping[str, str] = field(default_factory=dict)
     heatmap_dirs: Mapping[str, str] = field(default_factory=dict)
     radius: float = 0.0
     seed: int = 0

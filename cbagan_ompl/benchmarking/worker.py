@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from zlib import crc32
 
+from ..errors import ConfigError
 from ..heatmap import Heatmap
 from ..planning.benchmark import Entrant, RunOptions, check_entrants, run_benchmark
-from ..planning.plan import Provider, heatmap_provider
+from ..planning.plan import SAMPLERS, Provider, heatmap_provider
 from .logs import ExperimentLog, format_log, join_logs, parse_log
 from .measures import MAP, add_measures
 from .selection import BenchmarkTask, heatmap_file
-from .settings import Settings
+from .settings import LEARNED, Settings
 
 
 @dataclass(frozen=True)
@@ -94,8 +95,10 @@ def _provider(job: Job, sampler: str) -> Provider | None:
             return heatmap
 
         return from_file
-    model = job.settings.model if sampler == "learned" else None
-    return heatmap_provider(sampler, model)[1]
+    model = job.settings.models.get(sampler)
+    if model is not None and sampler in set(SAMPLERS) - {LEARNED}:
+        raise ConfigError(f"a model cannot be called {sampler}, this is another sampler's name")
+    return heatmap_provider(sampler if model is None else LEARNED, model)[1]
 
 
 def _described(log: ExperimentLog, job: Job) -> ExperimentLog:
