@@ -21,7 +21,7 @@ from cbagan_ompl.datasets.writing import write_csv
 from cbagan_ompl.evaluation.predictions import stored_predictions
 
 STORED = "sagan_test_predictions"
-COLUMNS = ("map", "start_x", "start_y", "goal_x", "goal_y")
+COLUMNS = ("map", "start_x", "start_y", "goal_x", "goal_y", "family")
 
 
 def main() -> None:
@@ -38,7 +38,7 @@ def main() -> None:
     chosen = chosen[np.argsort(dataset.test.map_of[chosen], kind="stable")]
     names = map_names(dataset, chosen)
     ends = [(*dataset.test.start[i].tolist(), *dataset.test.goal[i].tolist()) for i in chosen]
-    rows = [(name, *points) for name, points in zip(names, ends, strict=True)]
+    rows = [(name, *points, family(name)) for name, points in zip(names, ends, strict=True)]
     args.output.mkdir(parents=True, exist_ok=True)
     write_csv(args.output / "tasks.csv", COLUMNS, rows)
     arguments = [str(args.dataset / "maps" / f"{name}.png") for name in dict.fromkeys(names)]
@@ -52,6 +52,11 @@ def main() -> None:
 def map_names(dataset: Dataset, chosen: np.ndarray) -> list[str]:
     """The name of the map of each task."""
     return [f"map_{dataset.map_numbers[k]}" for k in dataset.test.map_of[chosen]]
+
+
+def family(name: str) -> str:
+    """The original that a map is a copy of: ten each, in the order of their numbers."""
+    return f"original {int(name.removeprefix('map_')) // 10}"
 
 
 def write_heatmaps(dataset: Path, folder: Path, chosen: np.ndarray, names: list[str]) -> None:

@@ -26,11 +26,13 @@ class Task:
         start: (x, y) in the map's world coordinates.
         goal: (x, y) in the map's world coordinates.
         optimal_cost: length of the shortest path in world units, where it is known.
+        family: what kind of map it is on, where that is known.
     """
 
     start: tuple[float, float]
     goal: tuple[float, float]
     optimal_cost: float | None = None
+    family: str | None = None
 
 
 def load_tasks(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
@@ -42,8 +44,9 @@ def load_tasks(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
     and a path in any direction may be shorter.
 
     A ``.csv`` file has the columns ``map, start_x, start_y, goal_x, goal_y`` in any order,
-    optionally ``optimal_cost``, and any others, which are not read. ``map`` is the file or the
-    name of a map; rows of other maps than ``grid`` are left out. Coordinates are world ones.
+    optionally ``optimal_cost`` and ``family``, and any others, which are not read. ``map`` is the
+    file or the name of a map; rows of other maps than ``grid`` are left out. Coordinates are world
+    ones.
 
     Whether the tasks can be planned for is not checked here, :meth:`GridMap.check_task` does that.
 
@@ -139,7 +142,7 @@ def _csv_task(place: str, row: dict[str, str]) -> Task:
     cost = _number(place, row, "optimal_cost") if row.get("optimal_cost", "").strip() else None
     if cost is not None and cost < 0:
         raise MapError(f"{place}: optimal_cost is a length and cannot be {cost:g}")
-    return Task((start_x, start_y), (goal_x, goal_y), cost)
+    return Task((start_x, start_y), (goal_x, goal_y), cost, row.get("family") or None)
 
 
 def _number(place: str, row: dict[str, str], column: str) -> float:

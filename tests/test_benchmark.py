@@ -180,7 +180,7 @@ def test_report(finished: Finished) -> None:
     assert rows_of["RRT", "uniform"]["ratios"] == {}
     assert rows_of["RRT", "corridor"]["ratios"]["first_solution_s"]["median"] > 0
     assert rows_of["RRT", "corridor"]["runs"] == 6
-    assert list(summary["maps"]) == ["walls"]
+    assert list(summary["families"]) == ["walls"]
     text = (finished.folder / "summary.md").read_text()
     assert text == finished.printed.removesuffix("\n")
     assert "| RRTstar | corridor | " in text

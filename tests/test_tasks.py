@@ -93,7 +93,9 @@ def test_csv_rows_of_this_map(tmp_path):
 def test_csv_columns_in_any_order_with_others(tmp_path):
     text = "\ufeffgoal_x, goal_y,family,map,start_x,start_y\r\n3,4,city,arena.v2,1,2\r\n"
     grid = GridMap([[1]], name="arena.v2")
-    assert load_tasks(written(tmp_path / "t.csv", text), grid) == [Task((1, 2), (3, 4))]
+    assert load_tasks(written(tmp_path / "t.csv", text), grid) == [
+        Task((1, 2), (3, 4), family="city")
+    ]
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ The output folder holds, when all is done:
 
   logs/MAP_N.log    OMPL's log of each task, with further properties of the runs
   benchmark.db      SQLite, for Planner Arena and OMPL's scripts
-  summary.json      medians and ratios with 95 % intervals, over all tasks and by map
+  summary.json      medians and ratios with 95 % intervals, over all tasks and by kind of map
   summary.md        the same to be read
   *.png, *.pdf      plots
 
@@ -50,8 +50,8 @@ def add_benchmark_parser(commands: Any) -> None:
     tasks.add_argument(
         "--tasks",
         metavar="FILE",
-        help="tasks for the maps: .csv (map,start_x,start_y,goal_x,goal_y[,optimal_cost]) or "
-        "MovingAI .scen (default: those that come with a map, otherwise random ones)",
+        help="tasks for the maps: .csv (map,start_x,start_y,goal_x,goal_y[,optimal_cost,"
+        "family]) or MovingAI .scen (default: those that come with a map, otherwise random ones)",
     )
     tasks.add_argument(
         "--tasks-per-map",

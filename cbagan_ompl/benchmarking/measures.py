@@ -33,6 +33,7 @@ FIRST_TIME = "first solution time REAL"
 FIRST_COST = "first solution cost REAL"
 #: Property of an experiment: name of its map.
 MAP = "map VARCHAR"
+FAMILY = "map family VARCHAR"
 #: Property of an experiment: the least cost of all its runs, or the optimal one where given.
 BEST_KNOWN = "best_known_cost REAL"
 

@@ -236,7 +236,7 @@ def _boxes(runs: _Runs, value: Callable[[_Run], float], label: str) -> Figure:
 
 def _ratios(results: Results, runs: _Runs, measure: str, label: str) -> Figure:
     """A panel for each planner, in it a row for each map and one for all."""
-    groups = {"all maps": results.overall} | dict(sorted(results.maps.items()))
+    groups = {"all maps": results.overall} | dict(sorted(results.families.items()))
     styles = {sampler: style for sampler, style in _styles(runs).items() if sampler != BASELINE}
     places = dict(zip(styles, np.linspace(-0.25, 0.25, len(styles) + 2)[1:-1], strict=True))
     figure, panels = _figure(list(runs), 0.9 + _ROW_HEIGHT * len(groups))

@@ -29,7 +29,7 @@ _RATIOS_SHOWN = {
     "collision_checks": "checks",
 }
 
-_RATIOS_BY_MAP = {
+_RATIOS_BY_FAMILY = {
     "first_solution_total_s": "first solution with inference",
     "within_2_percent_total_s": "to 2 % of best with inference",
     "final_cost": "final cost",
@@ -96,14 +96,14 @@ def markdown(results: Results, circumstances: Circumstances) -> str:
     if compared:
         header = ["planner", "sampler", *_RATIOS_SHOWN.values()]
         parts += [f"## Ratios to {BASELINE}", _table(header, compared, _ratio_row), _RATIO_NOTES]
-        header = ["map", "planner", "sampler", *_RATIOS_BY_MAP.values()]
-        by_map = [
+        header = ["maps", "planner", "sampler", *_RATIOS_BY_FAMILY.values()]
+        by_family = [
             (name, summary)
-            for name, summaries in results.maps.items()
+            for name, summaries in results.families.items()
             for summary in summaries
             if summary.ratios
         ]
-        parts += ["## Ratios by map", _table(header, by_map, _map_row)]
+        parts += ["## Ratios by kind of map", _table(header, by_family, _family_row)]
     if circumstances.failures:
         failed = circumstances.failures.items()
         parts += ["## Tasks that failed"]
@@ -124,9 +124,9 @@ def _ratio_row(summary: Summary) -> list[str]:
     return [summary.planner, summary.sampler, *ratios]
 
 
-def _map_row(named: tuple[str, Summary]) -> list[str]:
+def _family_row(named: tuple[str, Summary]) -> list[str]:
     name, summary = named
-    ratios = (_ratio(summary.ratios[measure]) for measure in _RATIOS_BY_MAP)
+    ratios = (_ratio(summary.ratios[measure]) for measure in _RATIOS_BY_FAMILY)
     return [name, summary.planner, summary.sampler, *ratios]
 
 

@@ -14,10 +14,10 @@ from .measures import (
     BEST_KNOWN,
     CHECKS,
     COST,
+    FAMILY,
     FIRST_COST,
     FIRST_TIME,
     INFERENCE,
-    MAP,
     NODES,
     SOLVED,
     WITHIN_PERCENT,
@@ -77,11 +77,11 @@ class Results:
 
     Attributes:
         overall: over all tasks, one for each planner with each sampler.
-        maps: the same for each map, by its name.
+        families: the same for each map family; a map without one is a family of its own.
     """
 
     overall: list[Summary]
-    maps: dict[str, list[Summary]]
+    families: dict[str, list[Summary]]
 
 
 # A run's value, and whether it is but a lower bound.
@@ -146,11 +146,11 @@ _NO_RATIO = frozenset({"inference_s"})
 
 
 def results_of(logs: Sequence[ExperimentLog]) -> Results:
-    """Summaries over all tasks and by map; arguments as for :func:`summarise`."""
-    by_map: dict[str, list[ExperimentLog]] = {}
+    """Summaries over all tasks and by map family; arguments as for :func:`summarise`."""
+    families: dict[str, list[ExperimentLog]] = {}
     for log in logs:
-        by_map.setdefault(log.parameters[MAP], []).append(log)
-    return Results(summarise(logs), {name: summarise(of_map) for name, of_map in by_map.items()})
+        families.setdefault(log.parameters[FAMILY], []).append(log)
+    return Results(summarise(logs), {name: summarise(some) for name, some in families.items()})
 
 
 def summarise(logs: Sequence[ExperimentLog]) -> list[Summary]:

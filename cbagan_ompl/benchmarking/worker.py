@@ -12,7 +12,7 @@ from ..heatmap import Heatmap
 from ..planning.benchmark import Entrant, RunOptions, check_entrants, run_benchmark
 from ..planning.plan import SAMPLERS, Provider, heatmap_provider
 from .logs import ExperimentLog, format_log, join_logs, parse_log
-from .measures import MAP, add_measures
+from .measures import FAMILY, MAP, add_measures
 from .selection import BenchmarkTask, heatmap_file
 from .settings import LEARNED, Settings
 
@@ -108,6 +108,8 @@ def _described(log: ExperimentLog, job: Job) -> ExperimentLog:
         parameters={
             **log.parameters,
             MAP: job.task.grid.name,
+            # A map without a family is one of its own.
+            FAMILY: job.task.task.family or job.task.grid.name,
             "task INTEGER": str(job.task.number),
             "start_x REAL": f"{start_x:.9g}",
             "start_y REAL": f"{start_y:.9g}",

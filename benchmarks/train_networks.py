@@ -1,0 +1,56 @@
+r"""Train the paper's networks with the same budget and gather their scores.
+
+    python benchmarks/train_networks.py DATASET --output runs \
+        --json benchmarks/results/networks.json
+
+CBAGAN and SAGAN are trained with three seeds, the ablations with one. Each run takes a folder of
+its own; runs that are complete are not repeated, one that was interrupted goes on.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from cbagan_ompl.datasets.layout import load_dataset
+from cbagan_ompl.files import write_json
+from cbagan_ompl.network.checkpoints import BEST, LAST, load_checkpoint
+from cbagan_ompl.network.config import TrainingConfig
+from cbagan_ompl.network.training import train
+
+SEEDS = {"cbagan": (0, 1, 2), "sa": (0,), "ca": (0,), "none": (0,), "sagan": (0, 1, 2)}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("dataset", metavar="DATASET")
+    parser.add_argument("--output", type=Path, required=True, metavar="DIR")
+    parser.add_argument("--epochs", type=int, default=10, help="the budget (default: 10)")
+    parser.add_argument("--device", default="auto")
+    parser.add_argument("--json", metavar="FILE")
+    args = parser.parse_args()
+    dataset = load_dataset(args.dataset)
+    result: dict[str, Any] = {"epochs": args.epochs, "test": {}}
+    for network, seeds in SEEDS.items():
+        for seed in seeds:
+            config = replace(TrainingConfig().with_network(network), epochs=args.epochs, seed=seed)
+            folder = args.output / f"{network}-{seed}"
+            if not is_complete(folder):
+                resume = (folder / LAST).exists()
+                train(dataset, config, folder, resume=resume, device=args.device)
+            scores = load_checkpoint(folder / BEST)["test"]
+            print(f"{network}, seed {seed}: IoU {scores['iou']:.4f}, Dice {scores['dice']:.4f}")
+            result["test"].setdefault(network, {})[str(seed)] = scores
+    if args.json is not None:
+        write_json(args.json, result)
+
+
+def is_complete(folder: Path) -> bool:
+    """Whether a run has come to its end, where the scores on the test tasks are added."""
+    return (folder / BEST).exists() and "test" in load_checkpoint(folder / BEST)
+
+
+if __name__ == "__main__":
+    main()
