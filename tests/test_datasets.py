@@ -3,6 +3,7 @@ from __future__ import annotations
 import csv
 import filecmp
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -29,6 +30,7 @@ from cbagan_ompl.datasets.generation import (
 from cbagan_ompl.datasets.importing import described, opened, write_dataset
 from cbagan_ompl.datasets.layout import Dataset, load_dataset
 from cbagan_ompl.datasets.noise import label_noise
+from cbagan_ompl.datasets.pool import run_all
 from cbagan_ompl.datasets.splits import is_test_task
 from cbagan_ompl.evaluation.metrics import joins
 from cbagan_ompl.gridmap import GridMap
@@ -292,6 +294,11 @@ def test_generate_import_and_noise_commands(
     assert json.loads(report.read_text())["tasks"] == 1
     assert main([*words, "--tasks", "7"]) == 2
     assert "from 1 to 1, got 7" in capsys.readouterr().err
+
+
+def test_a_process_that_dies() -> None:
+    with pytest.raises(DatasetError, match="a process that worked on the maps has died"):
+        run_all(os._exit, [(3,)], 1, "maps", progress=False)
 
 
 def test_an_interrupt_says_how_to_go_on(tmp_path: Path) -> None:

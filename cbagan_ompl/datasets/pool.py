@@ -5,10 +5,13 @@ from __future__ import annotations
 import signal
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import active_children, get_context
 from typing import Any, TypeVar
 
 from tqdm import tqdm
+
+from ..errors import DatasetError
 
 T = TypeVar("T")
 
@@ -31,6 +34,7 @@ def run_all(
 
     Raises:
         KeyboardInterrupt: after an interrupt; calls that have begun are given up.
+        DatasetError: a process has died.
         Exception: what a call raised.
     """
     results: dict[int, T] = {}
@@ -43,6 +47,10 @@ def run_all(
             done = as_completed(places)
             for future in tqdm(done, total=len(places), unit=f" {unit}", disable=not progress):
                 results[places[future]] = future.result()
+        except BrokenProcessPool as error:
+            raise DatasetError(
+                f"a process that worked on the {unit} has died, perhaps for lack of memory"
+            ) from error
         except BaseException:
             for child in set(active_children()) - others:
                 child.terminate()
