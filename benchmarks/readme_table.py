@@ -35,7 +35,13 @@ def main() -> None:
 
 def line(version: str, row: dict[str, Any], own: dict[str, Any]) -> str:
     solved = (f"{one['success']:.1%}" for one in (row, own))
-    ratios = (cell(row["ratios"][measure]) for measure in COLUMNS)
+    ratios = (
+        # Where most runs of both end at the limit, a ratio of limits would say nothing.
+        "-"
+        if row["censored"][measure] >= 0.5 <= own["censored"][measure]
+        else cell(row["ratios"][measure])
+        for measure in COLUMNS
+    )
     return f"| {' | '.join([version, row['planner'], row['sampler'], *solved, *ratios])} |"
 
 

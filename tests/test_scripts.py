@@ -69,8 +69,10 @@ def test_paper_tables(folder: Path, tmp_path: Path) -> None:
 def test_readme_table(tmp_path: Path) -> None:
     interval = {"median": 0.5, "low": 0.25, "high": None}
     names = ("nodes", "first_solution_s", "within_5_percent_s", "within_5_percent_total_s")
+    censored = {**dict.fromkeys(names, 0.1), "within_5_percent_s": 0.7}
     own = {"planner": "RRT", "sampler": "uniform", "success": 0.5, "ratios": {}}
-    learned = {"planner": "RRT", "sampler": "learned", "success": 1.0}
+    learned = {"planner": "RRT", "sampler": "learned", "success": 1.0, "censored": censored}
+    own["censored"] = censored
     summary = {
         "ompl_version": "2.0.1",
         "overall": [own, {**learned, "ratios": dict.fromkeys(names, interval)}],
@@ -78,4 +80,5 @@ def test_readme_table(tmp_path: Path) -> None:
     (tmp_path / "summary.json").write_text(json.dumps(summary))
     table = script("readme_table.py", str(tmp_path / "summary.json")).splitlines()
     assert table[2].startswith("| 2.0.1 | RRT | learned | 100.0% | 50.0% | 0.50 [0.25, ∞] |")
+    assert table[2].split(" | ")[7] == "-"
     assert len(table) == 3
