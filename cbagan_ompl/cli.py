@@ -6,7 +6,6 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from . import __version__
@@ -15,7 +14,7 @@ from .datasets.cli import add_dataset_parser
 from .draws import DEFAULT_UNIFORM_FRACTION
 from .errors import CbaganOmplError, ConfigError
 from .evaluation.cli import add_evaluate_parser
-from .files import write_json
+from .files import check_folder, write_json
 from .gridmap import GridMap
 from .heatmap import Heatmap
 from .map_options import add_map_options, map_options
@@ -168,9 +167,8 @@ def _plan(args: argparse.Namespace) -> int:
 
     if args.output is not None:
         check_picture_path(args.output)
-    for path in (args.output, args.json):
-        if path is not None and not Path(path).parent.is_dir():
-            raise ConfigError(f"cannot write {path}: its folder does not exist")
+    check_folder(args.output)
+    check_folder(args.json)
     grid = GridMap.load(args.map, **map_options(args))
     start, goal = _ends(args, grid)
     result = plan(

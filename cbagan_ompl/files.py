@@ -35,6 +35,19 @@ def read_text(path: Path) -> str:
         raise MapError(f"{path} is no text file in UTF-8: {error}") from error
 
 
+def check_folder(path: str | None) -> None:
+    """Refuse a file that cannot be written for lack of its folder, before any work is done.
+
+    Args:
+        path: of the file; None when none is wanted.
+
+    Raises:
+        ConfigError: its folder does not exist.
+    """
+    if path is not None and not Path(path).parent.is_dir():
+        raise ConfigError(f"cannot write {path}: its folder does not exist")
+
+
 def write_json(path: str, values: dict[str, Any]) -> None:
     """Write values as indented JSON.
 

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import contextlib
 import csv
 import filecmp
 import json
@@ -9,6 +10,7 @@ import subprocess
 import sys
 import tarfile
 import time
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,7 +29,7 @@ from cbagan_ompl.datasets.generation import (
     draw_map,
     generate,
 )
-from cbagan_ompl.datasets.importing import described, opened, write_dataset
+from cbagan_ompl.datasets.importing import described, read_set, write_dataset
 from cbagan_ompl.datasets.layout import Dataset, load_dataset
 from cbagan_ompl.datasets.noise import label_noise
 from cbagan_ompl.datasets.pool import run_all
@@ -136,7 +138,7 @@ def test_a_folder_with_a_set_is_not_overwritten(folder: Path, tmp_path: Path) ->
         ("test_fraction", 1.5, "1.5"),
         ("split", "wish", "'wish'"),
         ("seed", -1, "seed"),
-        ("copies", 6, "a split by map needs at least two"),
+        ("copies", 6, "a split by map needs two original maps"),
     ],
 )
 def test_options_that_make_no_sense(option: str, value: object, message: str) -> None:
@@ -246,15 +248,54 @@ def test_archives(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[st
 
 def test_what_is_no_set(tmp_path: Path) -> None:
     (tmp_path / "text.tar.gz").write_text("text")
-    with (
-        pytest.raises(DatasetError, match="neither a folder nor an archive"),
-        opened(tmp_path / "text.tar.gz"),
-    ):
-        pass
+    with pytest.raises(DatasetError, match="neither a folder nor an archive"):
+        read_set(tmp_path / "text.tar.gz")
     with tarfile.open(tmp_path / "empty.tar", "w"):
         pass
-    with pytest.raises(DatasetError, match=r"no train\.csv"), opened(tmp_path / "empty.tar"):
-        pass
+    with pytest.raises(DatasetError, match=r"holds one train\.csv, not 0"):
+        read_set(tmp_path / "empty.tar")
+
+
+def test_archives_that_are_damaged_or_ambiguous(tmp_path: Path) -> None:
+    root = write_training_set(tmp_path / "set")
+    for name, folders in (("two.zip", ("a", "b")), ("one.zip", (".",))):
+        with zipfile.ZipFile(tmp_path / name, "w", zipfile.ZIP_DEFLATED) as archive:
+            for folder in folders:
+                for file in files(root):
+                    archive.write(root / file, f"{folder}/{file}")
+    assert read_set(tmp_path / "one.zip").name == "one"
+    with pytest.raises(DatasetError, match=r"holds one train\.csv, not 2"):
+        read_set(tmp_path / "two.zip")
+    data = (tmp_path / "one.zip").read_bytes()
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        damaged = bytearray(data)
+        place = int(rng.integers(len(data) - 40))
+        damaged[place : place + 40] = rng.bytes(40)
+        (tmp_path / "damaged.zip").write_bytes(damaged)
+        # Whatever else is raised fails the test; damage between the files does no harm.
+        with contextlib.suppress(DatasetError):
+            read_set(tmp_path / "damaged.zip")
+
+
+def test_faults_inside_an_archive_name_the_archive_and_the_file(tmp_path: Path) -> None:
+    root = write_training_set(tmp_path / "set")
+    (root / "maps" / "map_1.png").write_bytes(b"")
+    with tarfile.open(tmp_path / "set.tar", "w") as archive:
+        archive.add(root, "inner")
+    with pytest.raises(DatasetError, match=r"set\.tar: inner/maps/map_1\.png: not an image"):
+        read_set(tmp_path / "set.tar")
+
+
+def test_lists_that_lead_out_of_the_folder(tmp_path: Path) -> None:
+    root = write_training_set(tmp_path / "set")
+    text = (root / "train.csv").read_text()
+    (root / "train.csv").write_text(text.replace("map_0.png", "../maps/map_0.png"))
+    with pytest.raises(DatasetError, match=r"train\.csv: '\.\./maps/map_0\.png' is no name"):
+        load_dataset(root)
+    (root / "train.csv").write_text(text.replace("map_0.png", "map_0\0.png"))
+    with pytest.raises(DatasetError, match="cannot read"):
+        load_dataset(root)
 
 
 def test_faults_of_a_set_are_told(tmp_path: Path) -> None:
@@ -292,8 +333,26 @@ def test_generate_import_and_noise_commands(
     words = ["dataset", "noise", str(tmp_path / "set"), "--runs", "2", "--json", str(report)]
     assert main(words) == 0
     assert json.loads(report.read_text())["tasks"] == 1
-    assert main([*words, "--tasks", "7"]) == 2
-    assert "from 1 to 1, got 7" in capsys.readouterr().err
+    for more, message in (
+        (("--tasks", "7"), "from 1 to 1, got 7"),
+        (("--tasks", "1", "--seed", "-1"), "seed must be at least 0, got -1"),
+        (("--runs", "0"), "runs and range must be positive, got 0"),
+        (("--json", str(tmp_path / "none" / "x.json")), "its folder does not exist"),
+    ):
+        assert main([*words, *more]) == 2
+        assert message in capsys.readouterr().err
+
+
+def test_a_split_without_a_copy_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    root = write_training_set(tmp_path / "set")
+    words = ["dataset", "import", str(root), "--split", "task"]
+    assert main(words) == 2
+    assert "give --output as well" in capsys.readouterr().err
+    assert main([*words, "--output", str(tmp_path / "copy"), "--seed", "-1"]) == 2
+    assert "seed must be at least 0, got -1" in capsys.readouterr().err
+    assert not (tmp_path / "copy").exists()
 
 
 def test_a_process_that_dies() -> None:

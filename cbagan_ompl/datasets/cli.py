@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ConfigError
-from ..files import write_json
+from ..files import check_folder, write_json
 from ..map_families import FAMILIES
 from .generation import RANGE, RUNS, GenerationSettings, generate
-from .importing import KEEP, described, opened, write_dataset
+from .importing import KEEP, described, read_set, write_dataset
 from .splits import SPLITS
 
 _HELP = """\
@@ -186,12 +186,15 @@ def _checked_jobs(args: argparse.Namespace) -> int:
 
 
 def _import(args: argparse.Namespace) -> int:
-    with opened(Path(args.path)) as dataset:
-        values = described(dataset)
-        if args.output is not None:
-            write_dataset(
-                Path(args.output), dataset, args.split, args.copies, args.test_fraction, args.seed
-            )
+    if args.output is None and args.split != KEEP:
+        raise ConfigError("a new split is written with a copy of the set: give --output as well")
+    check_folder(args.json)
+    dataset = read_set(Path(args.path))
+    values = described(dataset)
+    if args.output is not None:
+        write_dataset(
+            Path(args.output), dataset, args.split, args.copies, args.test_fraction, args.seed
+        )
     print(
         f"{values['name']}: {values['train_tasks']} tasks for training, {values['test_tasks']} for "
         f"testing, on {values['maps']} maps of {values['side']} x {values['side']} pixels\n"
@@ -209,6 +212,7 @@ def _import(args: argparse.Namespace) -> int:
 
 
 def _generate(args: argparse.Namespace) -> int:
+    check_folder(args.json)
     settings = GenerationSettings(
         maps=args.maps,
         tasks=args.tasks,
@@ -229,24 +233,18 @@ def _generate(args: argparse.Namespace) -> int:
         return 130
     print(f"{settings.maps * settings.tasks} tasks written to {args.output}")
     if args.json is not None:
-        with opened(Path(args.output)) as dataset:
-            write_json(args.json, described(dataset))
+        write_json(args.json, described(read_set(Path(args.output))))
     return 0
 
 
 def _noise(args: argparse.Namespace) -> int:
-    import numpy as np
+    from .noise import chosen_tasks, label_noise
 
-    from .noise import label_noise
-
+    check_folder(args.json)
     jobs = _checked_jobs(args)
-    with opened(Path(args.dataset)) as dataset:
-        tasks = dataset.test
+    tasks = read_set(Path(args.dataset)).test
     if args.tasks is not None:
-        if not 1 <= args.tasks <= len(tasks):
-            raise ConfigError(f"tasks must be from 1 to {len(tasks)}, got {args.tasks}")
-        chosen = np.random.default_rng(args.seed).choice(len(tasks), args.tasks, replace=False)
-        tasks = tasks.select(np.sort(chosen))
+        tasks = chosen_tasks(tasks, args.tasks, args.seed)
     longest_edge = tasks.side * RANGE if args.range is None else args.range
     values = label_noise(tasks, args.runs, longest_edge, args.seed, jobs)
     print(f"agreement of labels on {len(tasks)} tasks, {args.runs} runs of RRT each")

@@ -90,9 +90,7 @@ class GenerationSettings:
                 f"min_distance is a share of the map's side, from 0 to below 1, "
                 f"got {self.min_distance}"
             )
-        if self.seed < 0:
-            raise ConfigError(f"seed must be at least 0, got {self.seed}")
-        # Refuses a split that cannot be made before the work is done.
+        # Refuses a seed or a split that cannot be before the work is done.
         is_test_task(self.split, self.originals(), self.test_fraction, self.seed)
 
     def originals(self) -> NDArray[np.int64]:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import tarfile
 import zipfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+import zlib
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -22,22 +21,29 @@ from .writing import task_row, write_lists, write_map, write_tasks
 KEEP = "keep"
 
 
-@contextmanager
-def opened(path: Path) -> Iterator[Dataset]:
-    """The set in a folder, or in an archive (.tar, .tar.gz, .zip) that holds one folder of it.
+def read_set(path: Path) -> Dataset:
+    """The set in a folder, or in an archive (.tar, .tar.gz, .zip) that holds it in any folder.
 
     Raises:
-        DatasetError: it cannot be read, see :func:`cbagan_ompl.datasets.layout.load_dataset`.
+        DatasetError: it cannot be read, see :func:`cbagan_ompl.datasets.layout.load_dataset`, or
+            the archive holds no set or several.
     """
     if path.is_dir():
-        yield load_dataset(path)
-        return
-    with TemporaryDirectory() as folder:
-        _unpack(path, Path(folder))
-        lists = sorted(Path(folder).rglob("train.csv"))
-        if not lists:
-            raise DatasetError(f"{path}: there is no train.csv in the archive")
-        yield load_dataset(lists[0].parent)
+        return load_dataset(path)
+    with TemporaryDirectory() as temporary:
+        # A set that has no folder in the archive is called as the archive is.
+        folder = Path(temporary) / path.name.split(".")[0]
+        _unpack(path, folder)
+        lists = list(folder.rglob("train.csv"))
+        if len(lists) != 1:
+            raise DatasetError(
+                f"{path}: the archive of a set holds one train.csv, not {len(lists)}"
+            )
+        try:
+            return load_dataset(lists[0].parent)
+        except DatasetError as error:
+            message = str(error).replace(f"{folder}/", "")
+            raise DatasetError(f"{path}: {message}") from error
 
 
 def _unpack(path: Path, folder: Path) -> None:
@@ -48,11 +54,23 @@ def _unpack(path: Path, folder: Path) -> None:
             return
         with tarfile.open(path) as archive:
             archive.extractall(folder, filter="data")
-    except (OSError, tarfile.TarError, zipfile.BadZipFile, EOFError) as error:
+    except _UNREADABLE as error:
         reason = getattr(error, "strerror", None) or error
         raise DatasetError(
             f"{path}: neither a folder nor an archive that can be unpacked ({reason})"
         ) from error
+
+
+#: What damaged or encrypted archives raise; ``zipfile`` has no root for its own.
+_UNREADABLE = (
+    OSError,
+    EOFError,
+    tarfile.TarError,
+    zipfile.BadZipFile,
+    zlib.error,
+    RuntimeError,
+    ValueError,
+)
 
 
 def described(dataset: Dataset) -> dict[str, Any]:

@@ -129,8 +129,9 @@ def load_dataset(folder: str | PathLike[str]) -> Dataset:
         folder: the folder that holds ``train.csv``.
 
     Raises:
-        DatasetError: a file is missing or unreadable, a column is missing, a list is empty, an
-            image differs in size from the first map, or a task has no start or goal spot.
+        DatasetError: a file is missing or unreadable, a column is missing, a list is empty or
+            names a file elsewhere, an image differs in size from the first map, or a task has no
+            start or goal spot.
     """
     root = Path(folder)
     if not root.is_dir():
@@ -179,6 +180,10 @@ def _read_rows(path: Path) -> list[dict[str, str]]:
         )
     if not rows or any(not row[column] for row in rows for column in COLUMNS):
         raise DatasetError(f"{path}: the list is empty, or a line has an empty or missing cell")
+    for row in rows:
+        for column in COLUMNS:
+            if Path(row[column]).name != row[column]:
+                raise DatasetError(f"{path}: {row[column]!r} is no name of a file without folders")
     return rows
 
 
@@ -222,8 +227,10 @@ def read_image(path: Path) -> NDArray[np.uint8]:
     # imread itself would print a warning for a missing file, and cannot open every path.
     try:
         data = np.frombuffer(path.read_bytes(), dtype=np.uint8)
-    except OSError as error:
-        raise DatasetError(f"{path}: cannot read the image ({error.strerror})") from error
+    # A path with a NUL character is a ValueError.
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise DatasetError(f"{path}: cannot read the image ({reason})") from error
     image = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
     if image is None:
         raise DatasetError(f"{path}: not an image, or a damaged one")

@@ -15,6 +15,24 @@ from .layout import Tasks
 from .pool import run_all
 
 
+def chosen_tasks(tasks: Tasks, count: int, seed: int) -> Tasks:
+    """Some tasks, drawn at random, in their order.
+
+    Args:
+        tasks: to draw from.
+        count: how many.
+        seed: the same seed gives the same tasks.
+
+    Raises:
+        ConfigError: there are not so many tasks, or the seed is negative.
+    """
+    if not 1 <= count <= len(tasks):
+        raise ConfigError(f"tasks must be from 1 to {len(tasks)}, got {count}")
+    _check_seed(seed)
+    chosen = np.random.default_rng(seed).choice(len(tasks), count, replace=False)
+    return tasks.select(np.sort(chosen))
+
+
 def label_noise(
     tasks: Tasks, runs: int, range: float, seed: int, jobs: int, progress: bool = True
 ) -> dict[str, Any]:
@@ -43,10 +61,9 @@ def label_noise(
         ConfigError: an option that makes no sense.
         TaskError: a task whose start or goal is blocked, or which has no path.
     """
-    if runs < 1 or not 0 < range < float("inf") or seed < 0:
-        raise ConfigError(
-            f"runs and range must be positive and the seed at least 0, got {runs}, {range}, {seed}"
-        )
+    if runs < 1 or not 0 < range < float("inf"):
+        raise ConfigError(f"runs and range must be positive, got {runs} and {range}")
+    _check_seed(seed)
     free = tasks.free
     arguments = [
         (free[i], tasks.start[i], tasks.goal[i], runs, range, (seed, i))
@@ -66,6 +83,11 @@ def label_noise(
         "own labels and the first": _agreement(first, own),
         "own labels and the majority": _agreement(majority, own),
     }
+
+
+def _check_seed(seed: int) -> None:
+    if seed < 0:
+        raise ConfigError(f"seed must be at least 0, got {seed}")
 
 
 #: Labels of each task: the one that is predicted, and an odd number that vote.

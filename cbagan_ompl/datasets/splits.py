@@ -27,16 +27,20 @@ def is_test_task(
         (N,), true for testing.
 
     Raises:
-        ConfigError: an unknown split, a fraction that is none, or a single original to split.
+        ConfigError: an unknown split, a fraction that is none, a single original to split, or a
+            negative seed.
     """
     if split not in SPLITS:
         raise ConfigError(f"a split is one of {', '.join(SPLITS)}, got {split!r}")
     if not 0 < fraction < 1:
         raise ConfigError(f"the share of test tasks is between 0 and 1, got {fraction}")
+    if seed < 0:
+        raise ConfigError(f"seed must be at least 0, got {seed}")
     units = np.arange(len(originals)) if split == "task" else originals
     different = np.unique(units)
     if len(different) < 2:
-        raise ConfigError(f"a split by {split} needs at least two, there is {len(different)}")
+        what = "task" if split == "task" else "original map"
+        raise ConfigError(f"a split by {split} needs two {what}s, there is {len(different)}")
     count = min(max(1, round(fraction * len(different))), len(different) - 1)
     chosen = np.random.default_rng(seed).permutation(different)[:count]
     return np.isin(units, chosen)
