@@ -4,6 +4,7 @@ import argparse
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -365,9 +366,9 @@ def test_augmented_batches_are_seeded(dataset: Dataset) -> None:
         ),
         (
             lambda root: cv2.imwrite(
-                str(root / "maps/map_0.png"), np.full((20, 20, 3), 255, np.uint8)
+                str(root / "maps/map_0.png"), np.full((20, 32, 3), 255, np.uint8)
             ),
-            "multiple of 16",
+            "squares; map_0.png has 32 x 20",
         ),
     ],
 )
@@ -376,6 +377,13 @@ def test_damaged_sets(tmp_path: Path, damage: Any, message: str) -> None:
     damage(root)
     with pytest.raises(DatasetError, match=message):
         load_dataset(root)
+
+
+def test_images_of_a_size_that_the_networks_cannot_take(dataset: Dataset, tmp_path: Path) -> None:
+    cut = replace(dataset.train, maps=dataset.train.maps[:, :20, :20])
+    cut = replace(cut, region=cut.region[:, :20, :20])
+    with pytest.raises(DatasetError, match="a multiple of 16 pixels; these have 20"):
+        train(replace(dataset, train=cut), TINY, tmp_path, device="cpu", progress=False)
 
 
 def test_missing_folder(tmp_path: Path) -> None:
