@@ -19,7 +19,8 @@ import cv2
 import numpy as np
 import pytest
 
-from cbagan_ompl import ConfigError, GridMap, Heatmap, PlannerError, Task
+from cbagan_ompl import ConfigError, GridMap, Heatmap, HeatmapError, PlannerError, Task
+from cbagan_ompl.benchmarking.benchmark import Benchmark
 from cbagan_ompl.benchmarking.database import write_tables
 from cbagan_ompl.benchmarking.logs import ExperimentLog, parse_log
 from cbagan_ompl.benchmarking.runner import run_jobs
@@ -264,6 +265,43 @@ def test_crashes_are_reported_with_their_task(two_walls: GridMap, tmp_path: Path
     assert failures["two_walls_0"] == "ended by SIGABRT"
     assert "PlannerError: there is no planner 'Magic'" in failures["two_walls_1"].splitlines()[-1]
     assert [path.name for path in tmp_path.iterdir()] == ["two_walls_2.log"]
+
+
+# Ends the process that the task is sent to with a status that says whether torch is there.
+TELLING = """
+from pathlib import Path
+import numpy as np
+from cbagan_ompl import GridMap, Task
+from cbagan_ompl.benchmarking.runner import run_jobs
+from cbagan_ompl.benchmarking.selection import BenchmarkTask
+from cbagan_ompl.benchmarking.settings import Settings
+from cbagan_ompl.benchmarking.worker import Job
+
+class Telling(BenchmarkTask):
+    def __reduce__(self):
+        return eval, ("__import__('os')._exit(3 if 'torch' in __import__('sys').modules else 4)",)
+
+task = Telling(GridMap(np.ones((9, 9), bool)), 0, Task((1, 1), (8, 8)))
+settings = Settings(("RRT",), ("uniform", "mine"), models={"mine": "mine.pt"})
+print(run_jobs([Job(task, settings, Path("x.log"))], 1, show_progress=False))
+"""
+
+
+def test_torch_is_imported_before_the_tasks_and_not_by_each() -> None:
+    pytest.importorskip("torch")
+    done = subprocess.run([sys.executable, "-c", TELLING], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "exit status 3" in done.stdout
+
+
+def test_every_task_needs_its_heat_map(two_walls: GridMap, tmp_path: Path) -> None:
+    tasks = [BenchmarkTask(two_walls, i, Task((10, 10), (240, 240))) for i in range(2)]
+    np.save(tmp_path / "two_walls_0.npy", np.ones(two_walls.shape, np.float32))
+    settings = Settings(("RRT",), ("uniform", "peer"), heatmap_dirs={"peer": str(tmp_path)})
+    Benchmark(tasks[:1], settings, tmp_path / "one")
+    with pytest.raises(HeatmapError, match=r"neither .*two_walls_1\.npy"):
+        Benchmark(tasks, settings, tmp_path / "both")
+    assert not (tmp_path / "both").exists()
 
 
 def test_errors_in_events_come_out(two_walls: GridMap, corridor: Heatmap) -> None:

@@ -15,7 +15,7 @@ from .runner import run_jobs
 from .selection import BenchmarkTask
 from .settings import Settings
 from .statistics import results_of
-from .worker import Job, check_job
+from .worker import Job, check_heatmaps, check_job
 
 _SETTINGS, _LOGS = "settings.json", "logs"
 
@@ -46,8 +46,9 @@ class Benchmark:
         self.folder = folder
         logs = folder / _LOGS
         self._jobs = [Job(task, settings, logs / f"{task.name}.log") for task in tasks]
-        for job in self._jobs if settings.heatmap_dirs else self._jobs[:1]:
-            check_job(job)
+        check_job(self._jobs[0])
+        for job in self._jobs:
+            check_heatmaps(job)
         saved = folder / _SETTINGS
         if saved.is_file() and not resume:
             raise ConfigError(f"{folder} holds a benchmark: go on with --resume, or choose another")

@@ -22,7 +22,7 @@ from .settings import BASELINE
 from .statistics import Interval, Results
 
 _DOTS_PER_INCH = 200
-_PANEL_WIDTH, _PANEL_HEIGHT, _LEGEND_HEIGHT = 3.2, 2.7, 0.45
+_PANEL_WIDTH, _PANEL_HEIGHT, _LEGEND_WIDTH, _LEGEND_HEIGHT = 3.2, 2.7, 1.7, 0.45
 _ROW_HEIGHT = 0.32
 _MOST_COLUMNS = 3
 _TIMES = 200
@@ -135,7 +135,7 @@ def _curves(runs: _Runs, draw: _Draw, label: str) -> Figure:
         Line2D([], [], color=style.color, linestyle=style.line, linewidth=1.8, label=sampler)
         for sampler, style in styles.items()
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
+    _add_legend(figure, handles)
     return figure
 
 
@@ -156,6 +156,12 @@ def _figure(
         axes.set_axisbelow(True)
         axes.tick_params(labelbottom=True)
     return figure, panels
+
+
+def _add_legend(figure: Figure, handles: Sequence[Line2D]) -> None:
+    """Below all panels, as many entries beside each other as there is room for."""
+    columns = int(figure.get_figwidth() // _LEGEND_WIDTH)
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns, frameon=False)
 
 
 def _plain_numbers(axes: Axes) -> None:
@@ -228,7 +234,8 @@ def _boxes(runs: _Runs, value: Callable[[_Run], float], label: str) -> Figure:
         for box, sampler in zip(drawn["boxes"], by_sampler, strict=True):
             style = styles[sampler]
             box.set(facecolor="white", edgecolor=style.color, hatch=style.hatch, linewidth=1.2)
-        axes.set_xticks(range(1, len(by_sampler) + 1), list(by_sampler), fontsize=8)
+        slanted: dict[str, Any] = {"rotation": 25, "ha": "right", "rotation_mode": "anchor"}
+        axes.set_xticks(range(1, len(by_sampler) + 1), list(by_sampler), fontsize=8, **slanted)
         axes.set_yscale("log")
         axes.grid(axis="y", color="0.9", linewidth=0.6)
     return figure
@@ -250,14 +257,15 @@ def _ratios(results: Results, runs: _Runs, measure: str, label: str) -> Figure:
                     _draw_ratio(axes, summary.ratios[measure], place, style)
         axes.set_xscale("log")
         axes.set_xlabel(f"ratio to {BASELINE}")
-    panels[0].set_yticks(range(len(groups)), list(groups), fontsize=8)
+        axes.tick_params(axis="y", labelsize=8)
+    panels[0].set_yticks(range(len(groups)), list(groups))
     panels[0].set_ylim(len(groups) - 0.5, -0.5)
     handles = [
         Line2D([], [], color=style.color, marker=style.marker, label=sampler, linewidth=1.4)
         for sampler, style in styles.items()
     ]
     figure.suptitle(f"{label}, inference counted in", fontsize=10)
-    figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
+    _add_legend(figure, handles)
     return figure
 
 

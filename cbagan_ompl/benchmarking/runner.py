@@ -20,8 +20,8 @@ from .worker import Job, run_job
 
 # Imported once, by the server that the processes are forked from.
 _PRELOAD = ("cbagan_ompl.benchmarking.worker",)
-# Brings torch, which takes seconds.
-_PRELOAD_LEARNED = ("cbagan_ompl.network.predictor",)
+# Torch takes a second, and our modules import it only once it is needed.
+_PRELOAD_LEARNED = ("cbagan_ompl.network.predictor", "torch")
 
 # Characters of the end of a crashed process' output.
 _LAST_WORDS = 4000

@@ -46,6 +46,16 @@ def check_job(job: Job) -> None:
     check_entrants(grid, ends, _entrants(job), _options(job))
 
 
+def check_heatmaps(job: Job) -> None:
+    """Refuse a task that lacks a heat map of its own.
+
+    Raises:
+        HeatmapError: no heat map of the task where there should be one.
+    """
+    for folder in job.settings.heatmap_dirs.values():
+        heatmap_file(folder, job.task)
+
+
 def run_job(job: Job, after_round: Callable[[], None]) -> None:
     """Run a task and write its log, whole or not at all.
 
