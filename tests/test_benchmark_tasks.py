@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 from conftest import GOAL, START
 
 from cbagan_ompl import ConfigError, GridMap, Heatmap, HeatmapError, MapError, Task, TaskError
+from cbagan_ompl.benchmarking.benchmark import Benchmark
 from cbagan_ompl.benchmarking.logs import parse_log
 from cbagan_ompl.benchmarking.selection import (
     BenchmarkTask,
@@ -22,6 +24,8 @@ from cbagan_ompl.cli import main
 from cbagan_ompl.planning import compat
 from cbagan_ompl.planning.compat import ob
 from cbagan_ompl.planning.problem import set_parameter
+
+SUITES = Path(__file__).resolve().parents[1] / "benchmarks" / "suites"
 
 
 @pytest.fixture
@@ -121,6 +125,22 @@ def test_options_of_maps(tmp_path: Path) -> None:
     assert select_tasks([str(path)], tasks_per_map=1, map_options=options)[0].grid.free.all()
     with pytest.raises(MapError, match=r"threshold 0\.5"):
         select_tasks([str(path)], tasks_per_map=1)
+    words = ["benchmark", str(path), "--tasks-per-map", "1", "--planners", "RRT"]
+    words += ["--samplers", "uniform", "--runs", "1", "--output", str(tmp_path / "out")]
+    assert main(words) == 2
+    assert main([*words, "--threshold", "0.3"]) == 0
+
+
+@pytest.mark.parametrize("suite", sorted(SUITES.glob("*.args")), ids=lambda path: path.stem)
+def test_suites_can_run_on_every_ompl(
+    suite: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # All is checked before the first run.
+    monkeypatch.setattr(Benchmark, "run", lambda *_: {})
+    assert main(["benchmark", "bundled:maze", f"@{suite}", "--output", str(tmp_path)]) == 0
+    settings = json.loads((tmp_path / "settings.json").read_text())
+    assert len(settings["planners"]) == 5
+    assert settings["samplers"] == ["uniform", "learned", "corridor", "straight-line"]
 
 
 def test_arguments_can_be_kept_in_a_file(
