@@ -198,49 +198,49 @@ def warehouse(rng: np.random.Generator, width: int, height: int) -> Mask:
 def blocks(rng: np.random.Generator, width: int, height: int) -> Mask:
     """Upright boxes, apart or overlapping."""
     free, unit = _canvas(width, height)
-    share = rng.uniform(0.1, 0.3)
-    while (~free).mean() < share:
-        centre = rng.uniform(0, width), rng.uniform(0, height)
-        free &= ~_box(free, centre, (rng.uniform(2, 9) * unit, rng.uniform(2, 9) * unit))
-    return without_pockets(free)
+
+    def draw(centre: Point) -> Mask:
+        return _box(free, centre, (rng.uniform(2, 9) * unit, rng.uniform(2, 9) * unit))
+
+    return _strewn(free, rng, rng.uniform(0.1, 0.3), draw)
 
 
 def ellipses(rng: np.random.Generator, width: int, height: int) -> Mask:
     """Ellipses at any angle."""
     free, unit = _canvas(width, height)
-    share = rng.uniform(0.1, 0.3)
-    while (~free).mean() < share:
-        centre = rng.uniform(0, width), rng.uniform(0, height)
+
+    def draw(centre: Point) -> Mask:
         half = rng.uniform(2, 9) * unit, rng.uniform(2, 9) * unit
-        free &= ~_ellipse(free, centre, half, rng.uniform(0, pi))
-    return without_pockets(free)
+        return _ellipse(free, centre, half, rng.uniform(0, pi))
+
+    return _strewn(free, rng, rng.uniform(0.1, 0.3), draw)
 
 
 def triangles(rng: np.random.Generator, width: int, height: int) -> Mask:
     """Triangles at any angle."""
     free, unit = _canvas(width, height)
-    share = rng.uniform(0.08, 0.22)
-    while (~free).mean() < share:
-        centre = rng.uniform(0, width), rng.uniform(0, height)
-        free &= ~_triangle(free, centre, rng.uniform(5, 14) * unit, rng.uniform(0, 2 * pi))
-    return without_pockets(free)
+
+    def draw(centre: Point) -> Mask:
+        return _triangle(free, centre, rng.uniform(5, 14) * unit, rng.uniform(0, 2 * pi))
+
+    return _strewn(free, rng, rng.uniform(0.08, 0.22), draw)
 
 
 def tl_shapes(rng: np.random.Generator, width: int, height: int) -> Mask:
     """Shapes of the letters T and L, upright or turned by right angles or a little more."""
     free, unit = _canvas(width, height)
-    share = rng.uniform(0.1, 0.24)
-    while (~free).mean() < share:
-        centre = rng.uniform(0, width), rng.uniform(0, height)
+
+    def draw(centre: Point) -> Mask:
         angle = rng.integers(4) * pi / 2 + rng.normal(0, 0.1)
         bar, stem, thick = (rng.uniform(*span) * unit for span in ((4, 9), (4, 10), (1.2, 2.5)))
-        free &= ~_box(free, centre, (bar, thick), angle)
         # The stem hangs from the middle of the bar, or from one end of it.
         along = (bar - thick) * int(rng.integers(-1, 2))
         x = centre[0] + cos(angle) * along - sin(angle) * stem
         y = centre[1] + sin(angle) * along + cos(angle) * stem
-        free &= ~_box(free, (x, y), (thick, stem), angle)
-    return without_pockets(free)
+        upper = _box(free, centre, (bar, thick), angle)
+        return upper | _box(free, (x, y), (thick, stem), angle)
+
+    return _strewn(free, rng, rng.uniform(0.1, 0.24), draw)
 
 
 #: Every family by its name.
@@ -282,12 +282,34 @@ def _scatter(
     free: Mask, rng: np.random.Generator, unit: float, share: float, clear: Mask | None = None
 ) -> None:
     """Draw boxes and ellipses, none that touches ``clear``, until a share of the map is blocked."""
-    height, width = free.shape
-    while (~free).mean() < share:
-        centre = rng.uniform(0, width), rng.uniform(0, height)
+
+    def draw(centre: Point) -> Mask:
         long = rng.uniform(1.2, 4.2) * unit
         shape = _box if rng.random() < 0.6 else _ellipse
-        drawn = shape(free, centre, (long, long * rng.uniform(0.4, 1.0)), rng.uniform(0, pi))
+        return shape(free, centre, (long, long * rng.uniform(0.4, 1.0)), rng.uniform(0, pi))
+
+    _strew(free, rng, share, draw, clear)
+
+
+def _strewn(
+    free: Mask, rng: np.random.Generator, share: float, draw: Callable[[Point], Mask]
+) -> Mask:
+    """The map with obstacles strewn over it, and without pockets."""
+    _strew(free, rng, share, draw)
+    return without_pockets(free)
+
+
+def _strew(
+    free: Mask,
+    rng: np.random.Generator,
+    share: float,
+    draw: Callable[[Point], Mask],
+    clear: Mask | None = None,
+) -> None:
+    """Block what is drawn around random points, nothing that touches ``clear``, up to a share."""
+    height, width = free.shape
+    while (~free).mean() < share:
+        drawn = draw((rng.uniform(0, width), rng.uniform(0, height)))
         if clear is None or not (drawn & clear).any():
             free &= ~drawn
 
