@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from math import isfinite
-from typing import Any, TypeVar
+from typing import Any
 
+from ..markdown import table
 from .settings import BASELINE, Settings
 from .statistics import Interval, Results, Summary
 
@@ -83,19 +84,26 @@ def _json(value: Any) -> Any:
 def markdown(results: Results, circumstances: Circumstances) -> str:
     """The report."""
     settings = circumstances.settings
+    header = ["planner", "sampler", "solved", *_MEASURES_SHOWN.values()]
     parts = [
         "# Benchmark",
         f"OMPL {circumstances.ompl_version}, {circumstances.tasks} tasks, {settings.runs} runs of "
         f"each planner with each sampler on each, {settings.time:g} s a run.",
         f"    {circumstances.command}",
         "## Results",
-        _table(["planner", "sampler", "solved", *_MEASURES_SHOWN.values()], results.overall, _row),
+        table(
+            ["planner", "sampler", "solved", *_MEASURES_SHOWN.values()], map(_row, results.overall)
+        ),
         _NOTES,
     ]
     compared = [summary for summary in results.overall if summary.ratios]
     if compared:
         header = ["planner", "sampler", *_RATIOS_SHOWN.values()]
-        parts += [f"## Ratios to {BASELINE}", _table(header, compared, _ratio_row), _RATIO_NOTES]
+        parts += [
+            f"## Ratios to {BASELINE}",
+            table(header, map(_ratio_row, compared)),
+            _RATIO_NOTES,
+        ]
         header = ["maps", "planner", "sampler", *_RATIOS_BY_FAMILY.values()]
         by_family = [
             (name, summary)
@@ -103,20 +111,12 @@ def markdown(results: Results, circumstances: Circumstances) -> str:
             for summary in summaries
             if summary.ratios
         ]
-        parts += ["## Ratios by kind of map", _table(header, by_family, _family_row)]
+        parts += ["## Ratios by kind of map", table(header, map(_family_row, by_family))]
     if circumstances.failures:
         failed = circumstances.failures.items()
         parts += ["## Tasks that failed"]
         parts += ["\n".join(f"- {name}: {words.splitlines()[-1]}" for name, words in failed)]
     return "\n\n".join(part.strip("\n") for part in parts) + "\n"
-
-
-_T = TypeVar("_T")
-
-
-def _table(header: Sequence[str], items: Sequence[_T], row: Callable[[_T], list[str]]) -> str:
-    lines = [header, ["---"] * len(header), *(row(item) for item in items)]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
 def _ratio_row(summary: Summary) -> list[str]:

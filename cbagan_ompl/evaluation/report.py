@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ..markdown import table
 from .evaluate import Evaluation
 
 _COLUMNS = {
@@ -25,8 +26,7 @@ def markdown(evaluations: Sequence[Evaluation], frechet_name: str) -> str:
         frechet_name: what the column of the Frechet distance is called.
     """
     columns = ["", *_COLUMNS.values(), frechet_name, "parameters", "inference"]
-    lines = [columns, ["---"] * len(columns), *(_line(one) for one in evaluations)]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+    return table(columns, map(_line, evaluations)) + "\n"
 
 
 def _line(one: Evaluation) -> list[str]:
