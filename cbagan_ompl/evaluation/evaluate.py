@@ -12,15 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..datasets.layout import Tasks
+from ..heatmap import REGION_BORDER
 from .bootstrap import interval, resampled_weights
 from .frechet import frechet_distance
 from .metrics import TaskScores, task_scores
 
 if TYPE_CHECKING:
     from ..network.predictor import Predictor
-
-#: A predicted probability from here on counts as region.
-THRESHOLD = 0.5
 
 _BATCH = 32
 _TIMED_CALLS, _WARM_UP = 100, 10
@@ -40,8 +38,8 @@ class Evaluation:
         scores: see :meth:`cbagan_ompl.evaluation.metrics.TaskScores.means`.
         intervals: 95 % bootstrap intervals of these.
         frechet: distance to the true regions, by the features that were asked for.
-        model: for a network ``parameters``, ``file_bytes``, ``inference_ms`` (median of single
-            tasks on one CPU thread) and ``batched_ms`` (a task, in batches); empty for others.
+        model: for a network ``parameters``, ``inference_ms`` (median of single tasks on one CPU
+            thread) and ``batched_ms`` (a task, in batches); empty for others.
     """
 
     name: str
@@ -113,7 +111,7 @@ class Evaluator:
         values = predictor.probabilities(
             self._free[batch], self.tasks.start[batch], self.tasks.goal[batch]
         )
-        return np.asarray(values >= THRESHOLD)
+        return np.asarray(values >= REGION_BORDER)
 
     def _time_single(self, predictor: Predictor) -> float:
         seconds = []

@@ -12,12 +12,10 @@ from torch import nn
 from ..datasets.layout import Tasks
 from ..evaluation.metrics import region_scores
 from ..evaluation.predictions import trivial_predictions
+from ..heatmap import REGION_BORDER
 from .dataset import make_batch
 from .encoding import region_probability
 from .networks import encode
-
-#: A predicted probability from here on counts as region.
-THRESHOLD = 0.5
 
 
 def evaluate(
@@ -38,7 +36,7 @@ def _predict(
         batch = make_batch(tasks, indices, device)
         images = encode(batch)
         image = generator(images.map, images.points, torch.zeros_like(batch.free))
-        yield (region_probability(image)[:, 0] >= THRESHOLD).cpu().numpy()
+        yield (region_probability(image)[:, 0] >= REGION_BORDER).cpu().numpy()
 
 
 def trivial_scores(tasks: Tasks) -> dict[str, dict[str, float]]:
