@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -73,7 +74,7 @@ def write_lists(root: Path, rows: Sequence[Row], is_test: NDArray[np.bool_]) -> 
 
 
 def write_image(path: Path, pixels: NDArray[np.uint8]) -> None:
-    """Write a PNG file, (H, W, 3), red, green, blue; folders are made.
+    """Write a PNG file, (H, W, 3), red, green, blue, whole or not at all; folders are made.
 
     Raises:
         DatasetError: it cannot be written.
@@ -88,21 +89,18 @@ def write_csv(path: Path, columns: Iterable[str], rows: Iterable[Iterable[object
     Raises:
         DatasetError: it cannot be written.
     """
-    temporary = path.with_suffix(".tmp")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with temporary.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(columns)
-            writer.writerows(rows)
-        os.replace(temporary, path)
-    except OSError as error:
-        raise DatasetError(f"cannot write {path}: {error.strerror or error}") from error
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(columns)
+    writer.writerows(rows)
+    _write(path, text.getvalue().encode("utf-8"))
 
 
 def _write(path: Path, data: bytes) -> None:
+    temporary = path.with_suffix(".tmp")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(data)
+        temporary.write_bytes(data)
+        os.replace(temporary, path)
     except OSError as error:
         raise DatasetError(f"cannot write {path}: {error.strerror or error}") from error
