@@ -46,6 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = _parser()
     args = parser.parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
     try:
+        check_folder(getattr(args, "json", None))
         return int(args.run(args))
     except CbaganOmplError as error:
         print(f"cbagan-ompl {args.command}: {error}", file=sys.stderr)
@@ -168,7 +169,6 @@ def _plan(args: argparse.Namespace) -> int:
     if args.output is not None:
         check_picture_path(args.output)
     check_folder(args.output)
-    check_folder(args.json)
     grid = GridMap.load(args.map, **map_options(args))
     start, goal = _ends(args, grid)
     result = plan(

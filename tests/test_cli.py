@@ -144,3 +144,21 @@ def test_reader_that_goes_away() -> None:
     )
     assert done.returncode in (0, 141)
     assert done.stderr == ""
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["plan", "bundled:maze"],
+        ["dataset", "import", "set"],
+        ["train", "set", "--output", "run"],
+        ["export", "best.pt", "--output", "model.pt"],
+        ["evaluate", "--dataset", "set"],
+    ],
+)
+def test_json_without_its_folder_is_refused_before_the_work(
+    words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "none" / "x.json"
+    assert main([*words, "--json", str(path)]) == 2
+    assert f"cannot write {path}: its folder does not exist" in capsys.readouterr().err

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from ..checks import check_at_least
 from ..draws import DEFAULT_UNIFORM_FRACTION
 from ..errors import ConfigError
 from ..map_options import add_map_options, map_options
@@ -177,8 +178,7 @@ def _benchmark(args: argparse.Namespace) -> int:
     from .benchmark import Benchmark, write_results
     from .selection import select_tasks
 
-    if args.jobs < 1:
-        raise ConfigError(f"jobs must be at least 1, got {args.jobs}")
+    check_at_least("jobs", args.jobs, 1)
     if args.jobs > _cores():
         print(
             f"warning: {args.jobs} jobs share {_cores()} cores, all times will be too long",

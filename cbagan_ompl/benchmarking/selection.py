@@ -11,6 +11,7 @@ from zlib import crc32
 
 import numpy as np
 
+from ..checks import check_at_least
 from ..errors import ConfigError, HeatmapError, TaskError
 from ..gridmap import GridMap
 from ..heatmap import Heatmap
@@ -69,8 +70,8 @@ def select_tasks(
         TaskError: a task that cannot be planned for.
         ConfigError: two maps of one name, or an option that makes no sense.
     """
-    if tasks_per_map is not None and tasks_per_map < 1:
-        raise ConfigError(f"tasks per map must be at least 1, got {tasks_per_map}")
+    if tasks_per_map is not None:
+        check_at_least("tasks per map", tasks_per_map, 1)
     selected = []
     for path in maps or [BUNDLED + name for name in bundled_maps()]:
         grid = GridMap.load(path, **(map_options or {})).inflated(radius)

@@ -11,6 +11,7 @@ from typing import Any
 
 import yaml
 
+from ..checks import check_at_least
 from ..draws import DEFAULT_UNIFORM_FRACTION
 from ..errors import ConfigError
 
@@ -61,8 +62,7 @@ class Settings:
         for what, names in (("planners", self.planners), ("samplers", self.samplers)):
             if not names or len(set(names)) < len(names):
                 raise ConfigError(f"{what} must be named, and each once, got {', '.join(names)!r}")
-        if self.runs < 1:
-            raise ConfigError(f"runs must be at least 1, got {self.runs}")
+        check_at_least("runs", self.runs, 1)
         for name, value in (("time", self.time), ("range", self.range)):
             if value is not None and not (isfinite(value) and value > 0):
                 raise ConfigError(f"{name} must be above 0, got {value}")
@@ -70,8 +70,7 @@ class Settings:
             raise ConfigError(
                 f"uniform_fraction is a share above 0 and up to 1, got {self.uniform_fraction}"
             )
-        if self.seed < 0:
-            raise ConfigError(f"seed must be at least 0, got {self.seed}")
+        check_at_least("seed", self.seed, 0)
         for planner in self.parameters:
             if planner not in self.planners:
                 raise ConfigError(

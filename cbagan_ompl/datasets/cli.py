@@ -7,8 +7,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from ..checks import check_at_least
 from ..errors import ConfigError
-from ..files import check_folder, write_json
+from ..files import write_json
 from ..map_families import FAMILIES
 from .generation import RANGE, RUNS, GenerationSettings, generate
 from .importing import KEEP, described, read_set, write_dataset
@@ -88,22 +89,10 @@ def _add_generate(actions: Any) -> None:
     parser = _action(actions, "generate", "make a set", _GENERATE_HELP)
     parser.set_defaults(run=_generate)
     parser.add_argument("--output", required=True, metavar="DIR", help="folder of the set")
-    for name, what in (("maps", "number of maps"), ("tasks", "on each map")):
-        parser.add_argument(
-            f"--{name}",
-            type=int,
-            default=getattr(defaults, name),
-            metavar="N",
-            help=f"{what} (default: {getattr(defaults, name)})",
-        )
-    parser.add_argument(
-        "--size",
-        type=int,
-        default=defaults.size,
-        metavar="N",
-        help=f"side of the maps in pixels; training takes multiples of 16 "
-        f"(default: {defaults.size})",
-    )
+    _add_number(parser, "--maps", defaults.maps, "number of maps")
+    _add_number(parser, "--tasks", defaults.tasks, "on each map")
+    side = "side of the maps in pixels; training takes multiples of 16"
+    _add_number(parser, "--size", defaults.size, side)
     parser.add_argument(
         "--families",
         type=lambda text: tuple(text.split(",")),
@@ -111,13 +100,8 @@ def _add_generate(actions: Any) -> None:
         metavar="A,B",
         help=f"kinds of maps, taken in turn (default: all: {','.join(FAMILIES)})",
     )
-    parser.add_argument(
-        "--min-distance",
-        type=float,
-        default=defaults.min_distance,
-        metavar="F",
-        help=f"from start to goal, as a share of the side (default: {defaults.min_distance})",
-    )
+    distance = "from start to goal, as a share of the side"
+    _add_number(parser, "--min-distance", defaults.min_distance, distance)
     parser.add_argument(
         "--split",
         choices=SPLITS,
@@ -138,57 +122,45 @@ def _add_noise(actions: Any) -> None:
     parser.add_argument(
         "--tasks", type=int, metavar="N", help="only N of the test tasks, chosen by the seed"
     )
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="(default: 0)")
+    _add_number(parser, "--seed", 0, "")
     _add_label_options(parser)
 
 
 def _add_split_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--copies",
-        type=int,
-        default=1,
-        metavar="N",
-        help="maps from each original, by shift, shear and rotation; 10 in the paper (default: 1)",
-    )
-    parser.add_argument(
-        "--test-fraction",
-        type=float,
-        default=0.2,
-        metavar="F",
-        help="share of the tasks, or of the original maps, for testing (default: 0.2)",
-    )
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="(default: 0)")
+    copies = "maps from each original, by shift, shear and rotation; 10 in the paper"
+    _add_number(parser, "--copies", 1, copies)
+    fraction = "share of the tasks, or of the original maps, for testing"
+    _add_number(parser, "--test-fraction", 0.2, fraction)
+    _add_number(parser, "--seed", 0, "")
 
 
 def _add_label_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--runs",
-        type=int,
-        default=RUNS,
-        metavar="N",
-        help=f"of RRT for each label (default: {RUNS})",
-    )
+    _add_number(parser, "--runs", RUNS, "of RRT for each label")
     parser.add_argument(
         "--range",
         type=float,
         metavar="R",
         help=f"longest edge of RRT in pixels (default: the side / {1 / RANGE:g})",
     )
+    _add_number(parser, "--jobs", 1, "processes at a time")
+
+
+def _add_number(
+    parser: argparse.ArgumentParser, name: str, default: int | float, what: str
+) -> None:
+    """Add an option for a number of the type that its default has."""
     parser.add_argument(
-        "--jobs", type=int, default=1, metavar="N", help="processes at a time (default: 1)"
+        name,
+        type=type(default),
+        default=default,
+        metavar="N" if isinstance(default, int) else "F",
+        help=f"{what} (default: {default})".lstrip(),
     )
-
-
-def _checked_jobs(args: argparse.Namespace) -> int:
-    if args.jobs < 1:
-        raise ConfigError(f"jobs must be at least 1, got {args.jobs}")
-    return int(args.jobs)
 
 
 def _import(args: argparse.Namespace) -> int:
     if args.output is None and args.split != KEEP:
         raise ConfigError("a new split is written with a copy of the set: give --output as well")
-    check_folder(args.json)
     dataset = read_set(Path(args.path))
     values = described(dataset)
     if args.output is not None:
@@ -212,7 +184,6 @@ def _import(args: argparse.Namespace) -> int:
 
 
 def _generate(args: argparse.Namespace) -> int:
-    check_folder(args.json)
     settings = GenerationSettings(
         maps=args.maps,
         tasks=args.tasks,
@@ -226,8 +197,9 @@ def _generate(args: argparse.Namespace) -> int:
         test_fraction=args.test_fraction,
         seed=args.seed,
     )
+    check_at_least("jobs", args.jobs, 1)
     try:
-        generate(Path(args.output), settings, _checked_jobs(args), args.resume)
+        generate(Path(args.output), settings, args.jobs, args.resume)
     except KeyboardInterrupt:
         print("interrupted; go on with the same command and --resume", file=sys.stderr)
         return 130
@@ -240,13 +212,12 @@ def _generate(args: argparse.Namespace) -> int:
 def _noise(args: argparse.Namespace) -> int:
     from .noise import chosen_tasks, label_noise
 
-    check_folder(args.json)
-    jobs = _checked_jobs(args)
+    check_at_least("jobs", args.jobs, 1)
     tasks = read_set(Path(args.dataset)).test
     if args.tasks is not None:
         tasks = chosen_tasks(tasks, args.tasks, args.seed)
     longest_edge = tasks.side * RANGE if args.range is None else args.range
-    values = label_noise(tasks, args.runs, longest_edge, args.seed, jobs)
+    values = label_noise(tasks, args.runs, longest_edge, args.seed, args.jobs)
     print(f"agreement of labels on {len(tasks)} tasks, {args.runs} runs of RRT each")
     for name, scores in values.items():
         if isinstance(scores, dict):

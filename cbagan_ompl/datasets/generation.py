@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import check_at_least
 from ..errors import ConfigError, DatasetError
 from ..files import write_json
 from ..gridmap import GridMap
@@ -74,8 +75,7 @@ class GenerationSettings:
 
     def __post_init__(self) -> None:
         for name in ("maps", "tasks", "copies", "runs"):
-            if getattr(self, name) < 1:
-                raise ConfigError(f"{name} must be at least 1, got {getattr(self, name)}")
+            check_at_least(name, getattr(self, name), 1)
         if self.size < MIN_SIDE:
             raise ConfigError(f"size must be at least {MIN_SIDE} pixels, got {self.size}")
         unknown = [name for name in self.families if name not in FAMILIES]

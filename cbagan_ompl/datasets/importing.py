@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import check_at_least
 from ..errors import ConfigError, DatasetError
 from ..evaluation.metrics import joins
 from .layout import Dataset, Tasks, load_dataset
@@ -86,8 +87,9 @@ def described(dataset: Dataset) -> dict[str, Any]:
     train, test = dataset.train, dataset.test
     known = {_key(train, i) for i in range(len(train))}
     both = (train, test)
-    free = sum(int(tasks.free.sum()) for tasks in both)
-    region = sum(int((tasks.region.astype(bool) & tasks.free).sum()) for tasks in both)
+    masks = [(tasks.free, tasks.region.astype(bool)) for tasks in both]
+    free = sum(int(free.sum()) for free, _ in masks)
+    region = sum(int((free & region).sum()) for free, region in masks)
     return {
         **dataset.description(),
         "shared_maps": len(set(train.map_of.tolist()) & set(test.map_of.tolist())),
@@ -145,8 +147,7 @@ def write_dataset(
     """
     if (folder / "train.csv").exists():
         raise ConfigError(f"{folder} holds a set already; choose another folder")
-    if copies < 1:
-        raise ConfigError(f"copies must be at least 1, got {copies}")
+    check_at_least("copies", copies, 1)
     tasks, was_test = _together(dataset)
     order = np.argsort(tasks.map_of, kind="stable")
     tasks, was_test = tasks.select(order), was_test[order]

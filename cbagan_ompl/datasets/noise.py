@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import check_at_least
 from ..errors import ConfigError
 from ..evaluation.metrics import confusion
 from ..gridmap import GridMap
@@ -28,7 +29,7 @@ def chosen_tasks(tasks: Tasks, count: int, seed: int) -> Tasks:
     """
     if not 1 <= count <= len(tasks):
         raise ConfigError(f"tasks must be from 1 to {len(tasks)}, got {count}")
-    _check_seed(seed)
+    check_at_least("seed", seed, 0)
     chosen = np.random.default_rng(seed).choice(len(tasks), count, replace=False)
     return tasks.select(np.sort(chosen))
 
@@ -63,7 +64,7 @@ def label_noise(
     """
     if runs < 1 or not 0 < range < float("inf"):
         raise ConfigError(f"runs and range must be positive, got {runs} and {range}")
-    _check_seed(seed)
+    check_at_least("seed", seed, 0)
     free = tasks.free
     arguments = [
         (free[i], tasks.start[i], tasks.goal[i], runs, range, (seed, i))
@@ -83,11 +84,6 @@ def label_noise(
         "own labels and the first": _agreement(first, own),
         "own labels and the majority": _agreement(majority, own),
     }
-
-
-def _check_seed(seed: int) -> None:
-    if seed < 0:
-        raise ConfigError(f"seed must be at least 0, got {seed}")
 
 
 #: Labels of each task: the one that is predicted, and an odd number that vote.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import check_at_least
 from ..errors import ConfigError
 
 SPLITS = ("task", "map")
@@ -34,8 +35,7 @@ def is_test_task(
         raise ConfigError(f"a split is one of {', '.join(SPLITS)}, got {split!r}")
     if not 0 < fraction < 1:
         raise ConfigError(f"the share of test tasks is between 0 and 1, got {fraction}")
-    if seed < 0:
-        raise ConfigError(f"seed must be at least 0, got {seed}")
+    check_at_least("seed", seed, 0)
     units = np.arange(len(originals)) if split == "task" else originals
     different = np.unique(units)
     if len(different) < 2:

@@ -5,10 +5,15 @@ from __future__ import annotations
 import argparse
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from ..checks import check_at_least
 from ..errors import ConfigError
 from ..files import write_json
+
+if TYPE_CHECKING:
+    from ..datasets.layout import Tasks
+    from .evaluate import Evaluation
 
 _HELP = """\
 Score models on the tasks of a training set, next to predictors that know nothing.
@@ -74,8 +79,7 @@ def _evaluate(args: argparse.Namespace) -> int:
     from .predictions import stored_predictions, trivial_predictions
     from .report import markdown
 
-    if args.seed < 0:
-        raise ConfigError(f"seed must be at least 0, got {args.seed}")
+    check_at_least("seed", args.seed, 0)
     stored = [_named(text) for text in args.predictions]
     models = [load_model(path) for path in args.model or [None]]
     names = [str(model.record["name"]) for model in models] + [name for name, _ in stored]
@@ -126,7 +130,7 @@ def _named(text: str) -> tuple[str, Path]:
 
 
 def _save(
-    folder: Path, result: dict[str, Any], table: str, evaluations: list[Any], tasks: Any
+    folder: Path, result: dict[str, Any], table: str, evaluations: list[Evaluation], tasks: Tasks
 ) -> None:
     from .contact_sheet import save_contact_sheet
 

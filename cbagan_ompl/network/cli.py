@@ -8,6 +8,7 @@ from typing import Any
 
 import yaml
 
+from ..checks import check_at_least
 from ..errors import ConfigError
 from ..files import write_json
 from . import require_torch
@@ -128,8 +129,8 @@ def recipe_of(args: argparse.Namespace) -> TrainingConfig:
 
 def _train(args: argparse.Namespace) -> int:
     config = recipe_of(args)
-    if args.threads is not None and args.threads < 1:
-        raise ConfigError(f"--threads must be at least 1, got {args.threads}")
+    if args.threads is not None:
+        check_at_least("--threads", args.threads, 1)
     require_torch()
     import torch
 
