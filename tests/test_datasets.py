@@ -6,11 +6,13 @@ import filecmp
 import json
 import os
 import signal
+import struct
 import subprocess
 import sys
 import tarfile
 import time
 import zipfile
+import zlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -236,6 +238,27 @@ def test_import_and_split_anew(dataset: Dataset, tmp_path: Path) -> None:
         write_dataset(tmp_path / "maps", dataset)
 
 
+def test_a_copy_of_a_set_with_gaps_still_tells_whose_copies_its_maps_are(
+    folder: Path, tmp_path: Path
+) -> None:
+    for name in ("train", "test"):
+        rows = (folder / f"{name}.csv").read_text().splitlines()
+        kept = [row for row in rows if not row.startswith("map_0.")]
+        (tmp_path / f"{name}.csv").write_text("\n".join(kept) + "\n")
+    for name in ("maps", "tasks"):
+        (tmp_path / name).symlink_to(folder / name)
+    write_dataset(tmp_path / "copy", load_dataset(tmp_path))
+    copy = load_dataset(tmp_path / "copy")
+    assert copy.map_numbers == (1, 2, 3, 4, 5)
+    for seed in range(4):
+        write_dataset(tmp_path / str(seed), copy, split="map", copies=2, seed=seed)
+        split = load_dataset(tmp_path / str(seed))
+        originals = [
+            {split.map_numbers[k] // 2 for k in part.map_of} for part in (split.train, split.test)
+        ]
+        assert not set.intersection(*originals)
+
+
 def test_archives(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     archive = tmp_path / "small.tar.gz"
     with tarfile.open(archive, "w:gz") as tar:
@@ -317,6 +340,19 @@ def test_maps_of_other_names_have_no_known_originals(tmp_path: Path) -> None:
     assert dataset.map_numbers == (-1, 0)
     with pytest.raises(ConfigError, match=r"not called map_K\.png"):
         write_dataset(tmp_path / "copy", dataset, split="map", copies=2)
+    write_dataset(tmp_path / "copy", dataset)
+    assert load_dataset(tmp_path / "copy").map_numbers == (0, 1)
+
+
+def test_an_image_that_is_too_large(tmp_path: Path) -> None:
+    root = write_training_set(tmp_path / "set")
+    path = root / "maps" / "map_1.png"
+    data = bytearray(path.read_bytes())
+    data[16:24] = struct.pack(">II", 60_000, 60_000)  # width and height of the header
+    data[29:33] = struct.pack(">I", zlib.crc32(data[12:29]))
+    path.write_bytes(data)
+    with pytest.raises(DatasetError, match=r"map_1\.png: an image that is too large"):
+        load_dataset(root)
 
 
 # --- the command ----------------------------------------------------------------------------------

@@ -180,6 +180,14 @@ def test_faults_of_stored_predictions(folder: Path, dataset: Dataset, tmp_path: 
         stored_predictions(tmp_path, folder, "test")
 
 
+def test_predictions_of_another_size_than_the_labels(dataset: Dataset) -> None:
+    small = np.zeros((len(dataset.test), 16, 16), dtype=np.bool_)
+    with pytest.raises(DatasetError, match="8 of 16 x 16 pixels, the labels 8 of 32 x 32"):
+        evaluator(dataset.test).evaluate("small", small)
+    with pytest.raises(DatasetError, match="7 of 32 x 32 pixels, the labels 8"):
+        evaluator(dataset.test).evaluate("few", np.zeros((7, 32, 32), dtype=np.bool_))
+
+
 # --- the command ----------------------------------------------------------------------------------
 
 
@@ -272,4 +280,14 @@ def test_bad_options(model: Path, folder: Path, capsys: pytest.CaptureFixture[st
     assert "NAME=DIR" in capsys.readouterr().err
     assert run(*words, "--model", str(model)) == 2
     assert "two predictions are called 'tiny'" in capsys.readouterr().err
+    assert run(*words, "--predictions", f"straight line={folder}/tasks") == 2
+    assert "two predictions are called 'straight line'" in capsys.readouterr().err
+    for name in ("a/b", "a|b"):
+        assert run(*words, "--predictions", f"{name}={folder}/tasks") == 2
+        assert f"cannot be called {name!r}" in capsys.readouterr().err
+    # Before the work is done, not after it.
+    assert run(*words, "--output", str(folder / "test.csv" / "scores")) == 2
+    output = capsys.readouterr()
+    assert "cannot make the folder" in output.err
+    assert not output.out
     assert run(*words, "--seed", "-1") == 2

@@ -129,7 +129,10 @@ def write_dataset(
     test_fraction: float = 0.2,
     seed: int = 0,
 ) -> None:
-    """Write a set in the published layout, its maps and tasks numbered anew.
+    """Write a set in the published layout, its tasks numbered anew.
+
+    The maps keep their numbers, which tell whose copies they are; where not all are called
+    ``map_K.png``, or two have the same number, they are numbered anew too.
 
     Args:
         folder: where to; must not hold a set yet.
@@ -156,9 +159,12 @@ def write_dataset(
         is_test = is_test_task(
             split, _originals(dataset, copies)[tasks.map_of], test_fraction, seed
         )
+    numbers = dataset.map_numbers
+    if min(numbers) < 0 or len(set(numbers)) < len(numbers):
+        numbers = tuple(range(len(numbers)))
     rows = []
-    for k, free in enumerate(tasks.maps):
-        of_map = tasks.select(np.flatnonzero(tasks.map_of == k))
+    for i, (k, free) in enumerate(zip(numbers, tasks.maps, strict=True)):
+        of_map = tasks.select(np.flatnonzero(tasks.map_of == i))
         write_map(folder, k, free)
         write_tasks(folder, k, of_map)
         rows += [task_row(k, n) for n in range(len(of_map))]

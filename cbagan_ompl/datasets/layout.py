@@ -222,7 +222,7 @@ def read_image(path: Path) -> NDArray[np.uint8]:
     """An image as (H, W, 3), red, green, blue.
 
     Raises:
-        DatasetError: it is missing, or no image.
+        DatasetError: it is missing, no image, or too large.
     """
     # imread itself would print a warning for a missing file, and cannot open every path.
     try:
@@ -231,7 +231,10 @@ def read_image(path: Path) -> NDArray[np.uint8]:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise DatasetError(f"{path}: cannot read the image ({reason})") from error
-    image = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
+    try:
+        image = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
+    except cv2.error as error:
+        raise DatasetError(f"{path}: an image that is too large ({error.err})") from error
     if image is None:
         raise DatasetError(f"{path}: not an image, or a damaged one")
     return np.asarray(image[..., ::-1], dtype=np.uint8)

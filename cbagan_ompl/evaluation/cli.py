@@ -83,11 +83,12 @@ def _evaluate(args: argparse.Namespace) -> int:
     stored = [_named(text) for text in args.predictions]
     models = [load_model(path) for path in args.model or [None]]
     names = [str(model.record["name"]) for model in models] + [name for name, _ in stored]
-    twice = {name for name in names if names.count(name) > 1}
-    if twice:
-        raise ConfigError(f"two predictions are called {', '.join(sorted(twice))!r}")
     dataset = load_dataset(args.dataset)
     tasks = dataset.test if args.split == "test" else dataset.train
+    trivial = trivial_predictions(tasks)
+    _check_names([*names, *trivial])
+    if args.output is not None:
+        _make_folder(Path(args.output))
     features, frechet_name = region_features, OWN_NAME
     if args.inception is not None:
         features, frechet_name = partial(inception_features, path=args.inception), INCEPTION_NAME
@@ -101,10 +102,7 @@ def _evaluate(args: argparse.Namespace) -> int:
             evaluator.evaluate(name, stored_predictions(folder, Path(args.dataset), args.split))
             for name, folder in stored
         ),
-        *(
-            evaluator.evaluate(name, regions)
-            for name, regions in trivial_predictions(tasks).items()
-        ),
+        *(evaluator.evaluate(name, regions) for name, regions in trivial.items()),
     ]
     table = markdown(evaluations, frechet_name)
     print(f"{len(tasks)} {args.split} tasks of {dataset.name}\n\n{table}")
@@ -129,13 +127,29 @@ def _named(text: str) -> tuple[str, Path]:
     return name, Path(folder)
 
 
+def _check_names(names: list[str]) -> None:
+    twice = {name for name in names if names.count(name) > 1}
+    if twice:
+        raise ConfigError(f"two predictions are called {', '.join(sorted(twice))!r}")
+    for name in names:
+        # A picture is called after each, and the table has a line for it.
+        if any(character in name for character in "/\\|\n\0"):
+            raise ConfigError(f"a prediction cannot be called {name!r}; choose a plainer name")
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(f"cannot make the folder {folder}: {error.strerror or error}") from error
+
+
 def _save(
     folder: Path, result: dict[str, Any], table: str, evaluations: list[Evaluation], tasks: Tasks
 ) -> None:
     from .contact_sheet import save_contact_sheet
 
     try:
-        folder.mkdir(parents=True, exist_ok=True)
         (folder / "evaluation.md").write_text(table, encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"cannot write to {folder}: {error.strerror or error}") from error

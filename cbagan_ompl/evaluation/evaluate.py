@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..datasets.layout import Tasks
+from ..errors import DatasetError
 from ..heatmap import REGION_BORDER
 from .bootstrap import interval, resampled_weights
 from .frechet import frechet_distance
@@ -80,7 +81,17 @@ class Evaluator:
     def evaluate(
         self, name: str, predicted: NDArray[np.bool_], model: Mapping[str, Any] | None = None
     ) -> Evaluation:
-        """Score the predicted regions, (N, S, S), of all tasks."""
+        """Score the predicted regions, (N, S, S), of all tasks.
+
+        Raises:
+            DatasetError: the regions differ in number or size from the true ones.
+        """
+        if predicted.shape != self._truth.shape:
+            have, want = (
+                f"{count} of {width} x {height} pixels"
+                for count, height, width in (predicted.shape, self._truth.shape)
+            )
+            raise DatasetError(f"{name}: the predictions are {have}, the labels {want}")
         tasks = task_scores(predicted, self._truth, self._free, self.tasks.start, self.tasks.goal)
         scores = tasks.means(np.ones(len(predicted)))
         resampled = tasks.means(self._weights)
