@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import os
+import signal
+from collections.abc import Iterator
 
 # Before torch is loaded: on small tensors several threads mostly wait for each other, and on a
 # busy machine for minutes.
@@ -26,3 +28,11 @@ def two_walls() -> GridMap:
 @pytest.fixture(scope="session")
 def corridor(two_walls: GridMap) -> Heatmap:
     return Heatmap.corridor(two_walls, START, GOAL)
+
+
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """A process that was started in the background ignores SIGINT, and so do its children."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)

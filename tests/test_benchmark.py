@@ -8,16 +8,17 @@ import signal
 import sqlite3
 import subprocess
 import sys
-import time
-from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass
+from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 import pytest
+from interrupting import interrupted
 
 from cbagan_ompl import ConfigError, GridMap, Heatmap, HeatmapError, PlannerError, Task
 from cbagan_ompl.benchmarking.benchmark import Benchmark
@@ -208,38 +209,44 @@ def test_resume_runs_only_what_is_missing(
     assert "other options" in capsys.readouterr().err
 
 
-@pytest.fixture
-def interruptible() -> Iterator[None]:
-    """A process that was started in the background ignores SIGINT, and so do its children."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
-
-
 @pytest.mark.usefixtures("interruptible")
 def test_interrupt_keeps_finished_tasks(map_folder: Path, tmp_path: Path) -> None:
     folder = tmp_path / "out"
-    arguments = ["benchmark", str(map_folder / "walls.png"), "--tasks-per-map", "12", "--runs", "2"]
-    arguments += ["--time", "0.3", "--planners", "RRTstar", "--samplers", "uniform,corridor"]
-    arguments += ["--jobs", "1", "--output", str(folder)]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "cbagan_ompl.cli", *arguments],
-        stderr=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    end = time.monotonic() + 30
-    while not list(folder.glob("logs/*.log")) and time.monotonic() < end:
-        time.sleep(0.1)
-    process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=20)
-    assert process.returncode == 130
+    words = ["benchmark", str(map_folder / "walls.png"), "--tasks-per-map", "30", "--runs", "2"]
+    words += ["--time", "0.3", "--planners", "RRTstar", "--samplers", "uniform,corridor"]
+    words += ["--jobs", "1", "--output", str(folder)]
+    status, said = interrupted(words, lambda: any(folder.glob("logs/*.log")))
+    assert status == 130, said
     assert "Traceback" not in said
     assert said.endswith("interrupted\n")
     logs = list(folder.glob("logs/*"))
-    assert 1 <= len(logs) < 12
+    assert 1 <= len(logs) < 30
     for log in logs:
         assert parse_log(log.read_text()).runs == 2
+
+
+@pytest.mark.usefixtures("interruptible")
+def test_an_interrupt_while_a_process_starts_leaves_none(
+    two_walls: GridMap, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = Settings(("RRTstar",), ("uniform",), runs=99)
+    tasks = [BenchmarkTask(two_walls, i, Task((10, 10), (240, 240))) for i in range(3)]
+    jobs = [Job(task, settings, tmp_path / f"{task.name}.log") for task in tasks]
+    start, started = ForkServerProcess.start, []
+
+    def start_and_interrupt(process: ForkServerProcess) -> None:
+        start(process)
+        started.append(process)
+        if len(started) == 2:
+            # In another thread, as a mask of the main one would make it come.
+            pool.submit(signal.raise_signal, signal.SIGINT).result()
+
+    monkeypatch.setattr(ForkServerProcess, "start", start_and_interrupt)
+    with ThreadPoolExecutor(1) as pool, pytest.raises(KeyboardInterrupt):
+        run_jobs(jobs, 2, show_progress=False)
+    assert [process.exitcode for process in started] == [-signal.SIGTERM] * 2
+    assert not list(tmp_path.iterdir())
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 class Aborting(BenchmarkTask):
@@ -307,10 +314,11 @@ def test_every_task_needs_its_heat_map(two_walls: GridMap, tmp_path: Path) -> No
 def test_errors_in_events_come_out(two_walls: GridMap, corridor: Heatmap) -> None:
     task = two_walls.check_task((10, 10), (240, 240))
     entrants = [Entrant("RRTstar", name, lambda *_: corridor) for name in ("one", "two")]
-    began = time.monotonic()
+    options = RunOptions(5, 1.0, uniform_fraction=2)
+    rounds: list[int] = []
     with pytest.raises(ConfigError, match="uniform_fraction"):
-        run_benchmark("x", two_walls, task, entrants, RunOptions(5, 1.0, uniform_fraction=2))
-    assert time.monotonic() - began < 4
+        run_benchmark("x", two_walls, task, entrants, options, lambda: rounds.append(1))
+    assert len(rounds) == 1
 
 
 @pytest.mark.usefixtures("interruptible")

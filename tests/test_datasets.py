@@ -7,17 +7,18 @@ import json
 import os
 import signal
 import struct
-import subprocess
-import sys
 import tarfile
 import time
 import zipfile
 import zlib
 from dataclasses import replace
+from multiprocessing import active_children
+from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 
 import numpy as np
 import pytest
+from interrupting import interrupted
 from training_set import write_training_set
 
 from cbagan_ompl import ConfigError, DatasetError
@@ -396,19 +397,26 @@ def test_a_process_that_dies() -> None:
         run_all(os._exit, [(3,)], 1, "maps", progress=False)
 
 
+@pytest.mark.usefixtures("interruptible")
 def test_an_interrupt_says_how_to_go_on(tmp_path: Path) -> None:
     words = ["dataset", "generate", "--output", str(tmp_path), "--maps", "500", "--runs", "5"]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "cbagan_ompl.cli", *words],
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-    )
-    deadline = time.monotonic() + 60
-    while not list(tmp_path.glob("tasks/*.csv")) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    process.send_signal(signal.SIGINT)
-    message = process.communicate(timeout=60)[1]
-    assert process.returncode == 130, message
-    assert "--resume" in message
-    assert "Traceback" not in message
+    status, said = interrupted(words, lambda: any(tmp_path.glob("tasks/*.csv")))
+    assert status == 130, said
+    assert "--resume" in said
+    assert "Traceback" not in said
+
+
+@pytest.mark.usefixtures("interruptible")
+def test_an_interrupt_while_processes_start_leaves_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    start, started = ForkServerProcess.start, []
+
+    def interrupt_and_start(process: ForkServerProcess) -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+        start(process)
+        started.append(process)
+
+    monkeypatch.setattr(ForkServerProcess, "start", interrupt_and_start)
+    with pytest.raises(KeyboardInterrupt):
+        run_all(time.sleep, [(3600,), (3600,)], 2, "maps", progress=False)
+    assert started
+    assert not active_children()

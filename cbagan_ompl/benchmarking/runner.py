@@ -5,9 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from multiprocessing import get_context
+from collections.abc import Sequence
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,6 +13,7 @@ from typing import cast
 
 from tqdm import tqdm
 
+from ..processes import fork_server, interrupts_held
 from .settings import LEARNED
 from .worker import Job, run_job
 
@@ -46,33 +45,27 @@ def run_jobs(jobs: Sequence[Job], processes: int, show_progress: bool = True) ->
     failures: dict[str, str] = {}
     rounds = sum(job.settings.runs for job in jobs)
     bar = tqdm(total=rounds, unit="round", disable=not show_progress, dynamic_ncols=True)
-    with bar, TemporaryDirectory() as folder:
+    # Outermost: an interrupt is raised once no process is left that would use the folder.
+    with interrupts_held() as interrupted, bar, TemporaryDirectory() as folder:
         try:
             while waiting or running:
                 while waiting and len(running) < processes:
-                    with _interrupts_held():
-                        started = _Running(waiting.pop(), Path(folder))
-                        running[started.rounds] = started
-                for ready in cast("list[Connection]", wait(list(running))):
-                    done = running[ready].rounds_done()
+                    started = _Running(waiting.pop(), Path(folder))
+                    running[started.rounds] = started
+                ready = cast("list[Connection]", wait([*running, interrupted]))
+                if interrupted in ready:
+                    break
+                for pipe in ready:
+                    done = running[pipe].rounds_done()
                     bar.update(done)
                     if done == 0:
-                        _end(running.pop(ready), failures, bar)
+                        _end(running.pop(pipe), failures, bar)
         finally:
             for given_up in running.values():
                 given_up.process.terminate()
+            for given_up in running.values():
                 given_up.last_words()
     return failures
-
-
-@contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """An interrupt comes after the block: a process that has started is a process that we know."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _end(ended: _Running, failures: dict[str, str], bar: tqdm[None]) -> None:
@@ -92,9 +85,8 @@ class _Running:
     """
 
     def __init__(self, job: Job, folder: Path) -> None:
-        context = get_context("forkserver")
         learned = LEARNED in job.settings.samplers or job.settings.models
-        context.set_forkserver_preload([*_PRELOAD, *(_PRELOAD_LEARNED if learned else ())])
+        context = fork_server([*_PRELOAD, *(_PRELOAD_LEARNED if learned else ())])
         self.job = job
         self.rounds_left = job.settings.runs
         self._output = folder / job.task.name
@@ -120,6 +112,7 @@ class _Running:
         code = self.process.exitcode
         if not code:
             return ""
+        self.job.draft.unlink(missing_ok=True)
         output = self._output.read_text(encoding="utf-8", errors="replace")
         end = f"ended by {signal.Signals(-code).name}" if code < 0 else ""
         return f"{output[-_LAST_WORDS:]}\n{end}".strip() or f"exit status {code}"
@@ -127,7 +120,6 @@ class _Running:
 
 def _work(job: Job, rounds: Connection, output: Path) -> None:
     """What the process does; a traceback goes to its output as well."""
-    os.setsid()  # an interrupt from the terminal is for the parent alone
     with output.open("wb") as file:
         for stream in (1, 2):
             os.dup2(file.fileno(), stream)

@@ -31,6 +31,11 @@ class Job:
     settings: Settings
     log: Path
 
+    @property
+    def draft(self) -> Path:
+        """File that becomes the log once it is whole."""
+        return self.log.with_suffix(".part")
+
 
 def check_job(job: Job) -> None:
     """Refuse what cannot run, before time is spent.
@@ -68,9 +73,8 @@ def run_job(job: Job, after_round: Callable[[], None]) -> None:
     recording = run_benchmark(job.task.name, grid, ends, _entrants(job), _options(job), after_round)
     log = join_logs([parse_log(text) for text in recording.logs])
     log = add_measures(_described(log, job), recording.runs, task.optimal_cost)
-    draft = job.log.with_suffix(".part")
-    draft.write_text(format_log(log), encoding="utf-8")
-    draft.replace(job.log)
+    job.draft.write_text(format_log(log), encoding="utf-8")
+    job.draft.replace(job.log)
 
 
 def _options(job: Job) -> RunOptions:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import active_children, get_context
+from multiprocessing import active_children
 from typing import Any, TypeVar
 
 from tqdm import tqdm
 
 from ..errors import DatasetError
+from ..processes import fork_server, interrupts_held
 
 T = TypeVar("T")
 
@@ -39,11 +39,12 @@ def run_all(
     """
     results: dict[int, T] = {}
     others = set(active_children())
-    # Forked from a clean server: OMPL and OpenCV have threads, which a fork does not survive.
-    context = get_context("forkserver")
-    with ProcessPoolExecutor(processes, context, _ignore_interrupts) as pool:
-        places = {pool.submit(work, *args): i for i, args in enumerate(arguments)}
+    with interrupts_held():
+        context = fork_server()
+    with ProcessPoolExecutor(processes, context) as pool:
         try:
+            with interrupts_held():  # submitting starts the processes
+                places = {pool.submit(work, *args): i for i, args in enumerate(arguments)}
             done = as_completed(places)
             for future in tqdm(done, total=len(places), unit=f" {unit}", disable=not progress):
                 results[places[future]] = future.result()
@@ -57,8 +58,3 @@ def run_all(
             pool.shutdown(cancel_futures=True)
             raise
     return [results[i] for i in range(len(arguments))]
-
-
-def _ignore_interrupts() -> None:
-    """An interrupt from the terminal is for the parent alone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)

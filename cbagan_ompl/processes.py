@@ -1,0 +1,53 @@
+"""Processes that an interrupt neither hits nor leaves behind."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from multiprocessing import Pipe, forkserver, get_context, resource_tracker
+from multiprocessing.connection import Connection
+from multiprocessing.context import ForkServerContext
+from threading import current_thread, main_thread
+
+
+@contextmanager
+def interrupts_held() -> Iterator[Connection]:
+    """An interrupt in the block comes at its end; the yielded connection is ready from then on.
+
+    A mask of signals would not do: it holds for one thread, and an interrupt that any other one
+    takes, such as that of a progress bar, is raised in the main thread all the same.
+    """
+    came, sender = Pipe(duplex=False)
+    with came, sender:
+        if current_thread() is not main_thread():
+            yield came  # only the main thread gets interrupts
+            return
+        before = signal.signal(signal.SIGINT, lambda *_: sender.send_bytes(b"."))
+        try:
+            yield came
+        finally:
+            signal.signal(signal.SIGINT, before)
+            if came.poll():
+                signal.raise_signal(signal.SIGINT)
+
+
+def fork_server(preload: Sequence[str] = ()) -> ForkServerContext:
+    """What makes processes that are forked from a clean server.
+
+    OMPL, OpenCV and torch have threads, which a fork does not survive. Neither the server nor its
+    processes hear the interrupt of a terminal, which is for all processes that it started: they
+    end with the one that made them. To be called and used with :func:`interrupts_held`.
+
+    Args:
+        preload: modules that the server imports, where it is not there yet.
+    """
+    context = get_context("forkserver")
+    context.set_forkserver_preload(list(preload))
+    resource_tracker.ensure_running()  # lets interrupts in again, so it must be there before
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        forkserver.ensure_running()  # whose processes inherit the mask
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    return context
