@@ -265,7 +265,7 @@ def test_tensorboard_gets_losses_and_scores(dataset: Dataset, tmp_path: Path) ->
 def torchrun(processes: int, *words: str) -> None:
     command = [sys.executable, "-m", "torch.distributed.run", "--standalone"]
     command += [f"--nproc-per-node={processes}", *words]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
     assert done.returncode == 0, done.stderr
 
 
