@@ -18,6 +18,7 @@ from cbagan_ompl.datasets.layout import load_dataset
 from cbagan_ompl.files import write_json
 from cbagan_ompl.network.checkpoints import BEST, LAST, load_checkpoint
 from cbagan_ompl.network.config import TrainingConfig
+from cbagan_ompl.network.sources import DatasetSource
 from cbagan_ompl.network.training import train
 
 SEEDS = {"cbagan": (0, 1, 2), "sa": (0,), "ca": (0,), "none": (0,), "sagan": (0, 1, 2)}
@@ -39,7 +40,8 @@ def main() -> None:
             folder = args.output / f"{network}-{seed}"
             if not is_complete(folder):
                 resume = (folder / LAST).exists()
-                train(dataset, config, folder, resume=resume, device=args.device)
+                source = DatasetSource(dataset, config.validation_fraction, config.seed)
+                train(source, config, folder, resume=resume, device=args.device)
             scores = load_checkpoint(folder / BEST)["test"]
             print(f"{network}, seed {seed}: IoU {scores['iou']:.4f}, Dice {scores['dice']:.4f}")
             result["test"].setdefault(network, {})[str(seed)] = scores

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from .errors import ConfigError
+from importlib import import_module
+
+from .errors import ConfigError, MissingDependencyError
 
 
 def check_at_least(name: str, value: int, least: int) -> None:
@@ -13,3 +15,22 @@ def check_at_least(name: str, value: int, least: int) -> None:
     """
     if value < least:
         raise ConfigError(f"{name} must be at least {least}, got {value}")
+
+
+def require(package: str, extra: str) -> None:
+    """Check that an optional package is installed.
+
+    Args:
+        package: its name.
+        extra: of this package, that brings it.
+
+    Raises:
+        MissingDependencyError: it cannot be imported; the message says how to install it.
+    """
+    try:
+        import_module(package)
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"this needs {package}, which cannot be imported ({error}); "
+            f"install it with: pip install 'cbagan-ompl[{extra}]'"
+        ) from error

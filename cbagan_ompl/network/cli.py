@@ -4,23 +4,30 @@ from __future__ import annotations
 
 import argparse
 import sys
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 import yaml
 
 from ..checks import check_at_least
+from ..datasets.layout import load_dataset
+from ..datasets.worlds import HARD_DETOUR, TASKS_PER_MAP, WorldSettings
 from ..errors import ConfigError
 from ..files import write_json
 from . import require_torch
 from .config import NETWORKS, PRESETS, TrainingConfig
+from .sources import DatasetSource, TaskSource, WorldSchedule, world_source
 
 _TRAIN_HELP = """\
-Train the networks on a data set, and keep the best epoch.
+Train the networks on a data set or on worlds without end, and keep the best epoch.
 
-DATASET is a folder with train.csv, test.csv, maps/ and tasks/. After each epoch the output folder
-holds last.pt (to go on from with --resume), best.pt (to export) and log.jsonl (the scores).
+DATASET is a folder with train.csv, test.csv, maps/ and tasks/. With --worlds in its place maps of
+all families are drawn and labelled exactly while the networks learn, new ones in every epoch. After
+each epoch the output folder holds last.pt (to go on from with --resume), best.pt (to export) and
+log.jsonl (the scores).
 
   cbagan-ompl train DATASET --output runs/first
+  cbagan-ompl train --worlds --preset worlds --output runs/worlds
   cbagan-ompl export runs/first/best.pt --output models/first.pt
   cbagan-ompl plan MAP --model models/first.pt
 
@@ -46,7 +53,10 @@ def add_train_parser(subparsers: Any) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.set_defaults(run=_train)
-    parser.add_argument("dataset", metavar="DATASET", help="folder that holds train.csv")
+    tasks = parser.add_argument_group("tasks, one of both")
+    tasks.add_argument("dataset", metavar="DATASET", nargs="?", help="folder that holds train.csv")
+    tasks.add_argument("--worlds", action="store_true", help="draw tasks as they are used")
+    _add_world_options(parser.add_argument_group("with --worlds"))
     parser.add_argument("--output", required=True, metavar="DIR", help="folder for the run's files")
     parser.add_argument(
         "--resume", action="store_true", help="go on from last.pt in the output folder"
@@ -56,8 +66,8 @@ def add_train_parser(subparsers: Any) -> None:
         "--preset",
         choices=sorted(PRESETS),
         default="best",
-        help="best: what the bundled model was trained with; paper: the values of the paper "
-        "(default: best)",
+        help="worlds: what the bundled model was trained with, for images of 256 pixels; best: "
+        "the best one for the paper's data; paper: the values of the paper (default: best)",
     )
     recipe.add_argument(
         "--network",
@@ -85,6 +95,35 @@ def add_train_parser(subparsers: Any) -> None:
         "--tensorboard", action="store_true", help="write logs for TensorBoard into the folder"
     )
     parser.add_argument("--json", metavar="FILE", help="write the scores as JSON")
+
+
+def _add_world_options(group: Any) -> None:
+    settings, schedule = WorldSettings(), WorldSchedule()
+    for name, default, what in (
+        ("--size", settings.size, "side of the maps in pixels"),
+        ("--maps", schedule.maps, f"maps for each epoch, {TASKS_PER_MAP} tasks on each"),
+        ("--held-back", schedule.held_back, "maps for validation, and as many for the test"),
+        ("--jobs", schedule.jobs, "processes that draw"),
+        ("--world-seed", settings.seed, "seed of the tasks"),
+    ):
+        group.add_argument(
+            name, type=int, default=default, metavar="N", help=f"{what} (default: {default})"
+        )
+    group.add_argument(
+        "--hard-share",
+        type=float,
+        default=settings.hard_share,
+        metavar="F",
+        help=f"share of tasks whose way is {HARD_DETOUR} times as long as the straight line, or "
+        f"more (default: {settings.hard_share})",
+    )
+    group.add_argument(
+        "--families",
+        type=lambda text: tuple(text.split(",")),
+        default=settings.families,
+        metavar="A,B",
+        help=f"kinds of maps (default: all: {','.join(settings.families)})",
+    )
 
 
 def add_export_parser(subparsers: Any) -> None:
@@ -131,27 +170,32 @@ def _train(args: argparse.Namespace) -> int:
     config = recipe_of(args)
     if args.threads is not None:
         check_at_least("--threads", args.threads, 1)
+    if args.worlds == (args.dataset is not None):
+        raise ConfigError("tasks come from a DATASET or from --worlds: give one of both")
     require_torch()
     import torch
 
-    from ..datasets.layout import load_dataset
     from .distributed import leads
     from .training import train
 
     if args.threads is not None:
         torch.set_num_threads(args.threads)
-    dataset = load_dataset(args.dataset)
-    if leads():
-        print(f"{len(dataset.train)} tasks for training, {len(dataset.test)} for testing")
     try:
-        result = train(
-            dataset,
-            config,
-            args.output,
-            resume=args.resume,
-            device=args.device,
-            tensorboard=args.tensorboard,
-        )
+        with _source(args, config) as source:
+            if leads():
+                values = source.description()
+                print(
+                    f"{values['train_tasks']} tasks for training, "
+                    f"{values['test_tasks']} for testing"
+                )
+            result = train(
+                source,
+                config,
+                args.output,
+                resume=args.resume,
+                device=args.device,
+                tensorboard=args.tensorboard,
+            )
     except KeyboardInterrupt:
         print("interrupted; go on with the same command and --resume", file=sys.stderr)
         return 130
@@ -161,6 +205,15 @@ def _train(args: argparse.Namespace) -> int:
     if args.json is not None:
         write_json(args.json, result)
     return 0
+
+
+def _source(args: argparse.Namespace, config: TrainingConfig) -> AbstractContextManager[TaskSource]:
+    """The tasks that the arguments of ``train`` ask for."""
+    if args.worlds:
+        settings = WorldSettings(args.size, args.families, args.hard_share, args.world_seed)
+        return world_source(settings, WorldSchedule(args.maps, args.held_back, args.jobs))
+    dataset = load_dataset(args.dataset)
+    return nullcontext(DatasetSource(dataset, config.validation_fraction, config.seed))
 
 
 def _print_scores(result: dict[str, Any]) -> None:

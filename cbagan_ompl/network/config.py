@@ -36,6 +36,9 @@ class TrainingConfig:
             are lowered (on top of the schedule); 0 turns it off.
         plateau_factor: factor on the learning rates each time.
         widths: channels of the generator after each of its four stages down.
+        stem: channels of its map stem and point stem.
+        patch: side of the patches of pixels that its stems read as one place.
+        metrics: of its wavefronts; 0 for none.
         channel_attention: use channel attention (in all three networks).
         spatial_attention: use spatial attention (in all three networks).
         self_attention: use the self-attention of SAGAN (in all three networks).
@@ -49,6 +52,9 @@ class TrainingConfig:
         bce_weight: factor of the binary cross-entropy.
         dice_weight: factor of the Dice loss.
         dice_smooth: smoothing term of the Dice loss.
+        positive_weight: factor of the region's part of the binary cross-entropy; above 1 a missed
+            place costs more than one too many.
+        white_obstacles: the generator paints obstacles white, and learns about free space alone.
         symmetries: turn and mirror each task at random (8 symmetries of the square).
         reversal: exchange start and goal at random. Only for regions that do not depend on which
             is which: those of the paper's data set grew from one end, and there it costs
@@ -75,6 +81,9 @@ class TrainingConfig:
     plateau_patience: int = 0
     plateau_factor: float = 0.1
     widths: tuple[int, ...] = (32, 64, 96, 128)
+    stem: int = 16
+    patch: int = 1
+    metrics: int = 0
     channel_attention: bool = True
     spatial_attention: bool = True
     self_attention: bool = False
@@ -86,6 +95,8 @@ class TrainingConfig:
     bce_weight: float = 1.0
     dice_weight: float = 10.0
     dice_smooth: float = 1.0
+    positive_weight: float = 1.0
+    white_obstacles: bool = False
     symmetries: bool = True
     reversal: bool = False
     ema_decay: float = 0.998
@@ -108,7 +119,7 @@ class TrainingConfig:
                 )
         # Batch norm needs two tasks where the coarsest stage has one pixel.
         self._check("batch_size", self.batch_size >= 2, "at least 2")
-        for name in ("epochs", "discriminator_width", "adversarial_every"):
+        for name in ("epochs", "discriminator_width", "adversarial_every", "stem", "patch"):
             self._check(name, getattr(self, name) >= 1, "at least 1")
         for name in ("generator_lr", "map_discriminator_lr", "point_discriminator_lr"):
             self._check(name, getattr(self, name) > 0, "positive")
@@ -118,7 +129,9 @@ class TrainingConfig:
             self._check(name, 0 <= getattr(self, name) < 1, "at least 0 and below 1")
         self._check("validation_fraction", 0 < self.validation_fraction < 1, "between 0 and 1")
         for field in fields(self):
-            if field.name.endswith(("_weight", "_decay", "_smooth", "_alpha", "_patience", "seed")):
+            if field.name.endswith(
+                ("_weight", "_decay", "_smooth", "_alpha", "_patience", "metrics", "seed")
+            ):
                 self._check(field.name, getattr(self, field.name) >= 0, "at least 0")
 
     def _check(self, name: str, holds: bool, rule: str) -> None:

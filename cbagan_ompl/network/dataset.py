@@ -9,21 +9,27 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from ..datasets.layout import Dataset, Tasks
+from ..datasets.layout import Tasks
 from ..errors import DatasetError
-from .generator import STRIDE
+from .config import TrainingConfig
+from .generator import stride_of
 
 
-def check_trainable(dataset: Dataset) -> None:
-    """Refuse a data set that the networks cannot take.
+def check_trainable(side: int, config: TrainingConfig) -> None:
+    """Refuse images that the networks cannot take.
+
+    Args:
+        side: of the images in pixels.
+        config: the recipe.
 
     Raises:
-        DatasetError: the side of its images is no multiple of the networks' strides.
+        DatasetError: it is no multiple of the networks' strides.
     """
-    if dataset.train.side % STRIDE:
+    stride = stride_of(config.patch)
+    if side % stride:
         raise DatasetError(
-            f"{dataset.name}: the networks take images with a side that is a multiple of {STRIDE} "
-            f"pixels; these have {dataset.train.side}"
+            f"the networks take images with a side that is a multiple of {stride} pixels; these "
+            f"have {side}"
         )
 
 

@@ -18,10 +18,12 @@ class Discriminator(nn.Module):
     Args:
         width: channels of each input after the first convolution; 32 in the paper.
         attention: see :class:`AttentionBlock`; self-attention only in the body.
+        patch: images are averaged over patches of this many pixels a side first.
     """
 
-    def __init__(self, width: int = 32, attention: Attention = CBAM) -> None:
+    def __init__(self, width: int = 32, attention: Attention = CBAM, patch: int = 1) -> None:
         super().__init__()
+        self.shrink: nn.Module = nn.AvgPool2d(patch) if patch > 1 else nn.Identity()
         self.condition_stem = _stem(width, attention.without_self_attention())
         self.region_stem = _stem(width, attention.without_self_attention())
         self.body = nn.Sequential(
@@ -40,7 +42,10 @@ class Discriminator(nn.Module):
             condition: map image or point image, (B, 3, H, W) in [-1, 1].
             region: real or generated region image, (B, 3, H, W) in [-1, 1].
         """
-        both = (self.condition_stem(condition), self.region_stem(region))
+        both = (
+            self.condition_stem(self.shrink(condition)),
+            self.region_stem(self.shrink(region)),
+        )
         logits: Tensor = self.body(torch.cat(both, 1))
         return logits
 

@@ -23,7 +23,9 @@ def evaluate(
 ) -> dict[str, float]:
     """Scores of a generator's regions, see :func:`cbagan_ompl.evaluation.metrics.region_scores`."""
     predicted = np.concatenate(list(_predict(generator, tasks, device, batch_size)))
-    return region_scores(predicted, tasks.region.astype(bool), tasks.free, tasks.start, tasks.goal)
+    return region_scores(
+        predicted, tasks.region >= REGION_BORDER, tasks.free, tasks.start, tasks.goal
+    )
 
 
 @torch.inference_mode()
@@ -41,7 +43,7 @@ def _predict(
 
 def trivial_scores(tasks: Tasks) -> dict[str, dict[str, float]]:
     """Scores of two predictors that know nothing: all free space, and a straight band."""
-    truth, free = tasks.region.astype(bool), tasks.free
+    truth, free = tasks.region >= REGION_BORDER, tasks.free
     return {
         name: region_scores(predicted, truth, free, tasks.start, tasks.goal)
         for name, predicted in trivial_predictions(tasks).items()

@@ -16,7 +16,7 @@ from torch.nn import functional
 from ..errors import ModelError
 from .checkpoints import best_generator, load_checkpoint
 from .encoding import map_image, point_image, region_probability
-from .generator import STRIDE, Generator
+from .generator import Generator, stride_of
 from .model_files import MANIFEST, RECORD_NAME, RECORD_SCHEMA, read_manifest, sha256
 
 INPUTS = (
@@ -37,7 +37,7 @@ class RegionModel(nn.Module):
     def __init__(self, generator: Generator) -> None:
         super().__init__()
         self.generator = generator
-        self.stride = STRIDE
+        self.stride = stride_of(generator.patch)
 
     def forward(self, free: Tensor, start: Tensor, goal: Tensor) -> Tensor:
         """Probability of the region, (B, 1, H, W) in [0, 1], for any height and width.

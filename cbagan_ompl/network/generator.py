@@ -9,13 +9,10 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from .attention import CBAM, Attention, AttentionBlock
+from .wavefront import Wavefront
 
-#: The generator halves its input this many times; height and width are multiples of 2 to it.
+#: The generator halves its features this many times.
 STAGES = 4
-STRIDE = 2**STAGES
-
-#: Channels of the map stem and of the point stem; the noise stem has twice as many.
-STEM = 16
 
 
 class ResidualBlock(nn.Module):
@@ -100,31 +97,50 @@ class Generator(nn.Module):
       draws for the discriminators; only the last stage has none, where it would cost most;
     * self-attention, for SAGAN, where the features have a quarter of the side or less.
 
+    Two options go past the paper, for maps larger than its 64 pixels. With patches of P x P pixels
+    the stems read each patch as one place, every pixel of it, and the last layer paints all of its
+    pixels: the cost of an image with a P-th of the side, and no pixel lost. With metrics,
+    wavefronts (:class:`.wavefront.Wavefront`) spread over the places of the first stage, and what
+    they say joins the features on the way up.
+
     Args:
         widths: channels after each of the four stages on the way down; the way up mirrors them.
         attention: see :class:`AttentionBlock`.
+        stem: channels of the map stem, of the point stem, and of the last stage; the noise stem
+            has twice as many.
+        patch: P.
+        metrics: of the wavefronts; none of them with 0.
+        white_obstacles: leave obstacles white in the image.
     """
 
     def __init__(
         self,
         widths: Sequence[int] = (32, 64, 96, 128),
         attention: Attention = CBAM,
+        stem: int = 16,
+        patch: int = 1,
+        metrics: int = 0,
+        white_obstacles: bool = False,
     ) -> None:
         super().__init__()
-        self.map_stem = nn.Conv2d(3, STEM, 3, padding=1)
-        self.point_stem = nn.Conv2d(3, STEM, 3, padding=1)
-        self.noise_stem = nn.Conv2d(1, 2 * STEM, 3, padding=1)
+        self.patch = patch
+        self.white_obstacles = white_obstacles
+        self.map_stem = _stem(3, stem, patch)
+        self.point_stem = _stem(3, stem, patch)
+        self.noise_stem = _stem(1, 2 * stem, patch)
         fine = attention.without_self_attention()
         one, two, three, four = widths
-        self.down1 = ResidualBlock(4 * STEM, one, 2, fine)
+        self.down1 = ResidualBlock(4 * stem, one, 2, fine)
         self.down2 = ResidualBlock(one, two, 2, attention)
         self.down3 = ResidualBlock(two, three, 2, attention)
         self.down4 = ResidualBlock(three, four, 2, attention)
         self.up4 = UpBlock(four, three, attention)
         self.up3 = UpBlock(three, two, attention)
         self.up2 = UpBlock(two, one, fine)
-        self.up1 = UpBlock(one, STEM, Attention(False, False))
-        self.head = nn.Conv2d(STEM, 3, 1)
+        self.up1 = UpBlock(one, stem, Attention(False, False))
+        self.head = nn.Conv2d(stem, 3 * patch**2, 1)
+        self.wavefront = Wavefront(one, metrics) if metrics else None
+        self.fuse = ResidualBlock(one + 2 * metrics, one, 1, fine) if metrics else None
 
     def forward(self, map_image: Tensor, point_image: Tensor, noise: Tensor) -> Tensor:
         """The image of the region, values in (-1, 1).
@@ -135,7 +151,7 @@ class Generator(nn.Module):
             noise: (B, 1, H, W), standard normal in training, zero at inference.
 
         Returns:
-            (B, 3, H, W); H and W must be multiples of ``STRIDE``.
+            (B, 3, H, W); H and W must be multiples of :func:`stride_of` the patch.
         """
         of_map = torch.relu(self.map_stem(map_image))
         of_points = torch.relu(self.point_stem(point_image))
@@ -146,5 +162,40 @@ class Generator(nn.Module):
         features = self.up4(self.down4(eighth), eighth)
         features = self.up3(features, quarter)
         features = self.up2(features, half)
+        if self.wavefront is not None and self.fuse is not None:
+            start, goal = _places(point_image, 2 * self.patch)
+            fronts = self.wavefront(features, start, goal)
+            features = self.fuse(torch.cat((features, fronts.to(features.dtype)), 1))
         features = self.up1(features, of_map + of_points)
-        return torch.tanh(self.head(features))
+        image = torch.tanh(functional.pixel_shuffle(self.head(features), self.patch))
+        if self.white_obstacles:
+            image = image.masked_fill(map_image < 0, 1.0)
+        return image
+
+
+def stride_of(patch: int) -> int:
+    """What the height and the width of the images are multiples of."""
+    return int(patch * 2**STAGES)
+
+
+def _stem(channels: int, width: int, patch: int) -> nn.Conv2d:
+    if patch == 1:
+        return nn.Conv2d(channels, width, 3, padding=1)
+    return nn.Conv2d(channels, width, patch, stride=patch)
+
+
+def _places(point_image: Tensor, size: int) -> tuple[Tensor, Tensor]:
+    """The place of the start and that of the goal, for places of ``size`` x ``size`` pixels.
+
+    Args:
+        point_image: (B, 3, H, W), see :mod:`.encoding`.
+        size: of a place.
+
+    Returns:
+        Two tensors (B, 1, H / size, W / size), 1 where most of the spot is, 0 elsewhere.
+    """
+    darkness = functional.avg_pool2d(1.0 - point_image, size)
+    start, goal = darkness[:, 0:1], darkness[:, 2:3]
+    start = (start >= start.amax((2, 3), keepdim=True)).float()
+    goal = (goal >= goal.amax((2, 3), keepdim=True)).float()
+    return start, goal

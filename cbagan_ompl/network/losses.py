@@ -13,14 +13,20 @@ from torch import Tensor
 from torch.nn import functional
 
 
-def bce_loss(predicted: Tensor, target: Tensor) -> Tensor:
+def bce_loss(predicted: Tensor, target: Tensor, positive_weight: float = 1.0) -> Tensor:
     """L_bce^xy (eq. total_ce_loss), the mean over all pixels.
 
     Args:
         predicted: probability of the region, (B, 1, H, W) in [0, 1].
-        target: the true region, the same shape, 0 or 1.
+        target: the true region, the same shape, in [0, 1].
+        positive_weight: factor of -target log(predicted); 1 in the paper.
     """
-    return 2 * functional.binary_cross_entropy(predicted, target)
+    loss = functional.binary_cross_entropy(predicted, target)
+    if positive_weight != 1:
+        # The same bound of the logarithm as PyTorch's.
+        missed = -(target * predicted.log().clamp(min=-100)).mean()
+        loss = loss + (positive_weight - 1) * missed
+    return 2 * loss
 
 
 def dice_loss(predicted: Tensor, target: Tensor, smooth: float = 1.0) -> Tensor:
@@ -42,6 +48,7 @@ def segmentation_loss(
     bce_weight: float = 1.0,
     dice_weight: float = 10.0,
     smooth: float = 1.0,
+    positive_weight: float = 1.0,
 ) -> Tensor:
     """L (eq. total_loss), with the paper's factor 10 on the Dice loss.
 
@@ -54,8 +61,9 @@ def segmentation_loss(
         bce_weight: factor of L_bce^xy.
         dice_weight: factor of L_dice^xy.
         smooth: see :func:`dice_loss`.
+        positive_weight: see :func:`bce_loss`.
     """
-    return bce_weight * bce_loss(predicted, target) + dice_weight * dice_loss(
+    return bce_weight * bce_loss(predicted, target, positive_weight) + dice_weight * dice_loss(
         predicted, target, smooth
     )
 

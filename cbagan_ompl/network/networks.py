@@ -39,8 +39,10 @@ class Networks:
         self.group = group or ProcessGroup()
         self.generator = make_generator(config)
         attention = attention_of(config)
-        self.map_discriminator = Discriminator(config.discriminator_width, attention)
-        self.point_discriminator = Discriminator(config.discriminator_width, attention)
+        self.map_discriminator = Discriminator(config.discriminator_width, attention, config.patch)
+        self.point_discriminator = Discriminator(
+            config.discriminator_width, attention, config.patch
+        )
         self.average = copy.deepcopy(self.generator).requires_grad_(False).eval()
         self.rates = {
             "generator": config.generator_lr,
@@ -128,7 +130,14 @@ def _place(network: nn.Module, device: torch.device) -> None:
 
 def make_generator(config: TrainingConfig) -> Generator:
     """The generator that a recipe asks for, with fresh weights."""
-    return Generator(config.widths, attention_of(config))
+    return Generator(
+        config.widths,
+        attention_of(config),
+        config.stem,
+        config.patch,
+        config.metrics,
+        config.white_obstacles,
+    )
 
 
 def attention_of(config: TrainingConfig) -> Attention:

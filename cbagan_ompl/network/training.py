@@ -15,7 +15,7 @@ import torch
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from ..datasets.layout import Dataset, Tasks
+from ..datasets.layout import Tasks
 from ..errors import ConfigError
 from .checkpoints import BEST, LAST, SCHEMA, best_generator, load_checkpoint, save_atomically
 from .config import TrainingConfig
@@ -25,6 +25,7 @@ from .evaluation import evaluate, trivial_scores
 from .networks import Networks, encode, pick_device
 from .scalars import scalar_log, write_scalars
 from .schedule import learning_rate_factor, plateau_factor
+from .sources import TaskSource
 from .steps import adversarial_shares, discriminator_step, generator_step
 
 LOG = "log.jsonl"
@@ -64,7 +65,7 @@ class Run:
 
 
 def train(
-    dataset: Dataset,
+    source: TaskSource,
     config: TrainingConfig,
     output: str | PathLike[str],
     *,
@@ -83,7 +84,7 @@ def train(
     Under ``torchrun`` the processes share each batch, and the first one writes the files.
 
     Args:
-        dataset: see :func:`cbagan_ompl.datasets.layout.load_dataset`.
+        source: of the tasks, see :mod:`cbagan_ompl.network.sources`.
         config: the recipe.
         output: the folder for the files, made if missing.
         resume: go on from ``last.pt`` in that folder; without it the folder must hold none.
@@ -96,8 +97,8 @@ def train(
         know nothing, on the test tasks, the ``epoch`` number and the path of the ``checkpoint``.
 
     Raises:
-        ConfigError: ``resume`` with another recipe or data set, or without it although the folder
-            holds a run; the folder cannot be made; no such device; the loss is not finite; or the
+        ConfigError: ``resume`` with another recipe or other tasks, or without it although the
+            folder holds a run; the folder cannot be made; no such device; the loss is not finite; or the
             processes cannot share a batch evenly.
         DatasetError: the images are of a size that the networks cannot take.
         MissingDependencyError: ``tensorboard`` without the package of that name.
@@ -105,8 +106,7 @@ def train(
     """
     folder = Path(output)
     place = pick_device(device)
-    check_trainable(dataset)
-    training, validation = dataset.split(config.validation_fraction, config.seed)
+    check_trainable(source.side, config)
     with process_group(place) as group:
         if config.batch_size % group.size:
             raise ConfigError(
@@ -120,24 +120,24 @@ def train(
         if group.leads:
             _prepare_folder(folder, resume)
         if resume:
-            state = _matching_checkpoint(folder / LAST, config, dataset) if group.leads else None
+            state = _matching_checkpoint(folder / LAST, config, source) if group.leads else None
             run.load_state_dict(group.from_leader(state))
         progress = progress and group.leads
         if progress:
-            for name, scores in trivial_scores(validation).items():
+            for name, scores in trivial_scores(source.validation).items():
                 print(f"for comparison, {name}: {_summary(scores)}")
         log = scalar_log(folder, len(run.history)) if tensorboard and group.leads else None
         for epoch in range(len(run.history), config.epochs):
-            entry = _epoch(run, config, training, validation, place, epoch, progress)
+            entry = _epoch(run, config, source, place, epoch, progress)
             run.history.append(entry)
             if group.leads:
-                _save(run, config, dataset, folder)
+                _save(run, config, source, folder)
                 if log is not None:
                     write_scalars(log, entry)
             if progress:
                 scores, seconds = entry["validation"], entry["seconds"]
                 print(f"epoch {epoch + 1}/{config.epochs}: {_summary(scores)}, {seconds:.0f} s")
-        return group.from_leader(_finish(folder, dataset, place, config) if group.leads else None)
+        return group.from_leader(_finish(folder, source, place, config) if group.leads else None)
 
 
 def _prepare_folder(folder: Path, resume: bool) -> None:
@@ -154,19 +154,20 @@ def _prepare_folder(folder: Path, resume: bool) -> None:
 def _epoch(
     run: Run,
     config: TrainingConfig,
-    training: Tasks,
-    validation: Tasks,
+    source: TaskSource,
     device: torch.device,
     epoch: int,
     progress: bool,
 ) -> dict[str, Any]:
     """One pass over the tasks, and its entry in the log."""
     began = time.perf_counter()
-    means = _train_epoch(run, config, training, device, epoch, progress)
+    means = _train_epoch(run, config, source.epoch(epoch), device, epoch, progress)
     networks = run.networks
     model = networks.average if config.ema_decay else networks.generator
     scores = networks.group.from_leader(
-        evaluate(model, validation, device, config.batch_size) if networks.group.leads else None
+        evaluate(model, source.validation, device, config.batch_size)
+        if networks.group.leads
+        else None
     )
     seconds = round(time.perf_counter() - began, 1)
     return {"epoch": epoch + 1, "seconds": seconds, "losses": means, "validation": scores}
@@ -234,11 +235,11 @@ def _step(
     return errors | generator_step(networks, config, batch, images, fake, shares)
 
 
-def _save(run: Run, config: TrainingConfig, dataset: Dataset, folder: Path) -> None:
+def _save(run: Run, config: TrainingConfig, source: TaskSource, folder: Path) -> None:
     state = {
         "schema": SCHEMA,
         "config": config.to_dict(),
-        "dataset": dataset.description(),
+        "dataset": source.description(),
         **run.state_dict(),
     }
     ious = [entry["validation"]["iou"] for entry in run.history]
@@ -249,7 +250,7 @@ def _save(run: Run, config: TrainingConfig, dataset: Dataset, folder: Path) -> N
     (folder / LOG).write_text(lines, encoding="utf-8")
 
 
-def _matching_checkpoint(path: Path, config: TrainingConfig, dataset: Dataset) -> dict[str, Any]:
+def _matching_checkpoint(path: Path, config: TrainingConfig, source: TaskSource) -> dict[str, Any]:
     state = load_checkpoint(path)
     saved, wanted = state["config"], config.to_dict()
     changed = [name for name in wanted if saved.get(name) != wanted[name]]
@@ -258,19 +259,19 @@ def _matching_checkpoint(path: Path, config: TrainingConfig, dataset: Dataset) -
             f"{path} was written with other values of {', '.join(changed)}; "
             "resume with the recipe that the run began with"
         )
-    if state["dataset"] != dataset.description():
+    if state["dataset"] != source.description():
         raise ConfigError(f"{path} belongs to another data set: {state['dataset']}")
     return state
 
 
 def _finish(
-    folder: Path, dataset: Dataset, device: torch.device, config: TrainingConfig
+    folder: Path, source: TaskSource, device: torch.device, config: TrainingConfig
 ) -> dict[str, Any]:
     """Score the best epoch on the test tasks and add the scores to its checkpoint."""
     best = load_checkpoint(folder / BEST)
     generator = best_generator(best).to(device)
-    best["test"] = evaluate(generator, dataset.test, device, config.batch_size)
-    best["trivial"] = trivial_scores(dataset.test)
+    best["test"] = evaluate(generator, source.test, device, config.batch_size)
+    best["trivial"] = trivial_scores(source.test)
     save_atomically(best, folder / BEST)
     return {
         "checkpoint": str(folder / BEST),

@@ -1,0 +1,169 @@
+"""Wavefronts from start and goal over learned costs: how far a detour each place would be.
+
+Convolutions see as far as their number; which door a path takes is decided farther away. Value
+iteration (as in Tamar et al., "Value iteration networks", 2016) has no such limit: a front spreads
+from each end by weight-shared steps until nothing changes.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+
+
+class Wavefront(nn.Module):
+    """Features that say how much longer than the best one the best way through each place is.
+
+    For each of C metrics a 1x1 convolution gives the cost of every step between neighbouring
+    places (8-connected); D_s and D_g are the costs of the cheapest ways from the start and from
+    the goal. With the cheapest way of all, D*, the relative detour of a place is
+    (D_s + D_g) / D* - 1.
+
+    Fronts spread without gradients until they stand still. The gradient of a distance is the one
+    of the costs along its cheapest way.
+
+    Args:
+        channels: of the features that the costs are read from.
+        metrics: C.
+        steps: limit of the steps until the fronts stand still.
+    """
+
+    def __init__(self, channels: int, metrics: int, steps: int = 160) -> None:
+        super().__init__()
+        self.costs = nn.Conv2d(channels, 4 * metrics, 1)
+        self.steps = steps
+
+    def forward(self, features: Tensor, start: Tensor, goal: Tensor) -> Tensor:
+        """Two features a metric: closeness to the best way, sharp and wide.
+
+        Args:
+            features: (B, channels, H, W).
+            start: (B, 1, H, W), positive where the front of the start begins.
+            goal: (B, 1, H, W), the same of the goal.
+
+        Returns:
+            (B, 2 C, H, W) in [0, 1]; 1 on the cheapest ways.
+        """
+        edges = self.costs(features).float().clamp(-3.0, 6.0).exp()
+        ends = torch.cat((start, goal), 1).permute(2, 3, 0, 1) > 0
+        height, width, batch = ends.size(0), ends.size(1), ends.size(2)
+        # Both fronts at once, places first: every operation works on long rows.
+        costs = step_costs(edges.permute(2, 3, 0, 1)).unsqueeze(4).expand(-1, -1, -1, -1, 2, -1)
+        source = ends.unsqueeze(4).expand(-1, -1, -1, -1, costs.size(5))
+        shape = [height, width, batch, 2, costs.size(5)]
+        costs, source = costs.flatten(3), source.flatten(2)
+        distance = spread(costs.detach(), source, self.steps)
+        if self.training:
+            distance = with_gradients(distance, costs, source)
+        through = distance.view(shape).sum(3).permute(2, 3, 0, 1)
+        best = through.amin((2, 3), keepdim=True)
+        detour = (through - best) / (best + 1.0)
+        return torch.cat((torch.exp2(-20.0 * detour), torch.exp2(-4.0 * detour)), 1)
+
+
+def step_costs(edges: Tensor) -> Tensor:
+    """The costs of the eight steps into each place, in the order of :func:`neighbours`.
+
+    Args:
+        edges: (H, W, B, 4 C): of the steps between each place and the ones to its right, below it,
+            below to its right, and below to its left, C each; the same in both directions. Those
+            across corners are the root of 2 times as long.
+
+    Returns:
+        (8, H, W, B, C); 0 for steps from outside.
+    """
+    right, below, falling, rising = edges.chunk(4, 3)
+    falling, rising = 2.0**0.5 * falling, 2.0**0.5 * rising
+    steps = [
+        neighbours(_framed(right, 0.0))[0],
+        neighbours(_framed(below, 0.0))[1],
+        neighbours(_framed(falling, 0.0))[2],
+        neighbours(_framed(rising, 0.0))[3],
+    ]
+    steps.extend([right, below, falling, rising])
+    return torch.stack(steps)
+
+
+def neighbours(framed: Tensor) -> list[Tensor]:
+    """What lies around each place, as views.
+
+    Args:
+        framed: (H + 2, W + 2, ...).
+
+    Returns:
+        Eight tensors (H, W, ...): to the left, above, above to the left, above to the right, and
+        opposite to these: to the right, below, below to the right, below to the left.
+    """
+    height, width = framed.size(0) - 2, framed.size(1) - 2
+    views: list[Tensor] = []
+    for down, right in [(0, -1), (-1, 0), (-1, -1), (-1, 1), (0, 1), (1, 0), (1, 1), (1, -1)]:
+        views.append(framed[1 + down : 1 + down + height, 1 + right : 1 + right + width])
+    return views
+
+
+def spread(costs: Tensor, source: Tensor, steps: int) -> Tensor:
+    """Costs of the cheapest ways from the sources, without gradients.
+
+    Args:
+        costs: (8, H, W, K), see :func:`step_costs`, positive.
+        source: (H, W, K), true where the ways begin.
+        steps: limit of the steps.
+
+    Returns:
+        (H, W, K); 1e4 where no front has come.
+    """
+    with torch.no_grad():
+        far = torch.full(source.size(), 1e4, device=costs.device)
+        framed = _framed(far.masked_fill(source, 0.0), 1e4)
+        here = framed[1:-1, 1:-1]
+        views, of_step = neighbours(framed), costs.contiguous().unbind(0)
+        reached, before = torch.empty_like(far), torch.empty_like(far)
+        for step in range(steps):
+            for i in range(8):
+                torch.add(views[i], of_step[i], out=reached)
+                torch.minimum(here, reached, out=here)
+            if step % 8 == 7:
+                if torch.equal(here, before):
+                    break
+                before.copy_(here)
+        return here.contiguous()
+
+
+def with_gradients(distance: Tensor, costs: Tensor, source: Tensor) -> Tensor:
+    """The same distances as sums of costs along the cheapest ways, which have gradients.
+
+    Every place knows the one before it on its cheapest way. Sums over the last 2^k steps of all
+    ways double in length from one k to the next, so that a few rounds add up whole ways.
+
+    Args:
+        distance: as from :func:`spread`.
+        costs: as for :func:`spread`.
+        source: as for :func:`spread`.
+    """
+    height, width = distance.size(0), distance.size(1)
+    with torch.no_grad():
+        candidates = torch.stack(neighbours(_framed(distance, 1e4))) + costs
+        best, direction = candidates.min(0)
+        stays = source | (best >= 1e4)
+        places = torch.arange(height * width, device=costs.device).view(height, width, 1)
+        numbers = torch.stack(neighbours(_framed(places, 0.0)))
+        before = torch.where(
+            stays, places, numbers.expand(costs.size()).gather(0, direction[None])[0]
+        )
+    way = costs.gather(0, direction[None])[0].masked_fill(stays, 0.0).flatten(0, 1)
+    before = before.flatten(0, 1)
+    length = 1
+    while length < height * width:
+        way = way + way.gather(0, before)
+        before = before.gather(0, before)
+        length *= 2
+    return torch.where(distance < 1e4, way.view(distance.size()), distance)
+
+
+def _framed(values: Tensor, border: float) -> Tensor:
+    """(H, W, ...) -> (H + 2, W + 2, ...), with a value around it."""
+    shape = [values.size(0) + 2, values.size(1) + 2]
+    shape.extend(values.shape[2:])
+    framed = torch.full(shape, border, dtype=values.dtype, device=values.device)
+    framed[1:-1, 1:-1] = values
+    return framed
