@@ -13,7 +13,9 @@ from threading import current_thread, main_thread
 
 @contextmanager
 def interrupts_held() -> Iterator[Connection]:
-    """An interrupt in the block comes at its end; the yielded connection is ready from then on.
+    """An interrupt in the block comes at its end; the yielded connection is then ready to read.
+
+    A wait for the connection may miss an interrupt that another thread takes, until the next one.
 
     A mask of signals would not do: it holds for one thread, and an interrupt that any other one
     takes, such as that of a progress bar, is raised in the main thread all the same.

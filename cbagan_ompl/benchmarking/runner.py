@@ -22,6 +22,9 @@ _PRELOAD = ("cbagan_ompl.benchmarking.worker",)
 # Torch takes a second, and our modules import it only once it is needed.
 _PRELOAD_LEARNED = ("cbagan_ompl.network.predictor", "torch")
 
+# An interrupt that another thread took, or that came just before a wait, does not end the wait.
+_LOOK_AGAIN_S = 0.5
+
 # Characters of the end of a crashed process' output.
 _LAST_WORDS = 4000
 
@@ -52,7 +55,7 @@ def run_jobs(jobs: Sequence[Job], processes: int, show_progress: bool = True) ->
                 while waiting and len(running) < processes:
                     started = _Running(waiting.pop(), Path(folder))
                     running[started.rounds] = started
-                ready = cast("list[Connection]", wait([*running, interrupted]))
+                ready = cast("list[Connection]", wait([*running, interrupted], _LOOK_AGAIN_S))
                 if interrupted in ready:
                     break
                 for pipe in ready:
