@@ -196,11 +196,13 @@ def model(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     pytest.importorskip("torch")
     from cbagan_ompl.network.config import TrainingConfig
     from cbagan_ompl.network.export import export
+    from cbagan_ompl.network.sources import DatasetSource
     from cbagan_ompl.network.training import train
 
     root = tmp_path_factory.mktemp("model")
     config = TrainingConfig(epochs=1, batch_size=4, widths=(4, 4, 6, 8), discriminator_width=4)
-    run = train(load_dataset(folder), config, root / "run", device="cpu", progress=False)
+    source = DatasetSource(load_dataset(folder), config.validation_fraction, config.seed)
+    run = train(source, config, root / "run", device="cpu", progress=False)
     export(run["checkpoint"], root / "tiny.pt")
     return root / "tiny.pt"
 

@@ -33,6 +33,7 @@ from cbagan_ompl.network.predictor import (  # noqa: E402
     scaled_free,
     scaled_shape,
 )
+from cbagan_ompl.network.sources import DatasetSource  # noqa: E402
 from cbagan_ompl.network.training import train  # noqa: E402
 
 TINY = TrainingConfig(epochs=1, batch_size=4, widths=(4, 4, 6, 8), discriminator_width=4)
@@ -42,7 +43,8 @@ TINY = TrainingConfig(epochs=1, batch_size=4, widths=(4, 4, 6, 8), discriminator
 def checkpoint(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("run")
     dataset = load_dataset(write_training_set(folder / "tiny"))
-    return Path(train(dataset, TINY, folder / "out", device="cpu", progress=False)["checkpoint"])
+    source = DatasetSource(dataset, TINY.validation_fraction, TINY.seed)
+    return Path(train(source, TINY, folder / "out", device="cpu", progress=False)["checkpoint"])
 
 
 @pytest.fixture(scope="module")

@@ -24,6 +24,7 @@ from cbagan_ompl.network.config import TrainingConfig  # noqa: E402
 from cbagan_ompl.network.dataset import make_batch, transformed  # noqa: E402
 from cbagan_ompl.network.networks import Networks, encode  # noqa: E402
 from cbagan_ompl.network.schedule import learning_rate_factor, plateau_factor  # noqa: E402
+from cbagan_ompl.network.sources import DatasetSource  # noqa: E402
 from cbagan_ompl.network.steps import (  # noqa: E402
     adversarial_shares,
     discriminator_step,
@@ -46,6 +47,15 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def dataset(folder: Path) -> Dataset:
     return load_dataset(folder)
+
+
+def source_of(dataset: Dataset) -> DatasetSource:
+    return DatasetSource(dataset, TINY.validation_fraction, TINY.seed)
+
+
+@pytest.fixture(scope="module")
+def source(dataset: Dataset) -> DatasetSource:
+    return source_of(dataset)
 
 
 def weights(networks: Networks) -> dict[str, list[torch.Tensor]]:
@@ -120,9 +130,9 @@ def equal(a: Any, b: Any) -> bool:
 
 
 def test_resumed_run_equals_uninterrupted(
-    dataset: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    dataset: Dataset, source: DatasetSource, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = train(dataset, TINY, tmp_path / "whole", device="cpu", progress=False)
+    whole = train(source, TINY, tmp_path / "whole", device="cpu", progress=False)
 
     epochs = training._train_epoch
 
@@ -133,10 +143,10 @@ def test_resumed_run_equals_uninterrupted(
 
     monkeypatch.setattr(training, "_train_epoch", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        train(dataset, TINY, tmp_path / "parts", device="cpu", progress=False)
+        train(source, TINY, tmp_path / "parts", device="cpu", progress=False)
     assert len((tmp_path / "parts" / "log.jsonl").read_text().splitlines()) == 1
     monkeypatch.undo()
-    parts = train(dataset, TINY, tmp_path / "parts", resume=True, device="cpu", progress=False)
+    parts = train(source, TINY, tmp_path / "parts", resume=True, device="cpu", progress=False)
 
     assert parts["test"] == whole["test"]
     states = [load_checkpoint(tmp_path / run / "last.pt") for run in ("whole", "parts")]
@@ -147,13 +157,13 @@ def test_resumed_run_equals_uninterrupted(
     ]
 
 
-def test_training_learns(dataset: Dataset, tmp_path: Path) -> None:
+def test_training_learns(source: DatasetSource, tmp_path: Path) -> None:
     # The region turns the same way in every task, so mirrored tasks would contradict each other.
     config = TINY.updated(
         {"epochs": 30, "generator_lr": 0.01, "ema_decay": 0.5, "symmetries": False}
         | {"reversal": False}
     )
-    result = train(dataset, config, tmp_path, device="cpu", progress=False)
+    result = train(source, config, tmp_path, device="cpu", progress=False)
     assert result["test"]["iou"] > result["trivial"]["straight line"]["iou"] + 0.1
     log = [json.loads(line) for line in (tmp_path / "log.jsonl").read_text().splitlines()]
     assert len(log) == 30
@@ -161,30 +171,30 @@ def test_training_learns(dataset: Dataset, tmp_path: Path) -> None:
     assert log[-1]["losses"]["segmentation"] < log[0]["losses"]["segmentation"] / 2
 
 
-def test_resume_refuses_another_recipe(dataset: Dataset, tmp_path: Path) -> None:
+def test_resume_refuses_another_recipe(source: DatasetSource, tmp_path: Path) -> None:
     config = TINY.updated({"epochs": 1})
-    train(dataset, config, tmp_path, device="cpu", progress=False)
+    train(source, config, tmp_path, device="cpu", progress=False)
     with pytest.raises(ConfigError, match="resume"):
-        train(dataset, config, tmp_path, device="cpu", progress=False)
+        train(source, config, tmp_path, device="cpu", progress=False)
     with pytest.raises(ConfigError, match="seed"):
-        train(dataset, config.updated({"seed": 1}), tmp_path, resume=True, progress=False)
+        train(source, config.updated({"seed": 1}), tmp_path, resume=True, progress=False)
 
 
-def test_resume_without_a_run(dataset: Dataset, tmp_path: Path) -> None:
+def test_resume_without_a_run(source: DatasetSource, tmp_path: Path) -> None:
     with pytest.raises(ModelError, match="no such file"):
-        train(dataset, TINY, tmp_path, resume=True, progress=False)
+        train(source, TINY, tmp_path, resume=True, progress=False)
 
 
-def test_output_that_is_a_file(dataset: Dataset, tmp_path: Path) -> None:
+def test_output_that_is_a_file(source: DatasetSource, tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(ConfigError, match="cannot make the folder"):
-        train(dataset, TINY, tmp_path / "file", progress=False)
+        train(source, TINY, tmp_path / "file", progress=False)
 
 
-def test_checkpoint_that_is_none(dataset: Dataset, tmp_path: Path) -> None:
+def test_checkpoint_that_is_none(source: DatasetSource, tmp_path: Path) -> None:
     (tmp_path / "last.pt").write_text("text")
     with pytest.raises(ModelError, match="not a training checkpoint, or a damaged one"):
-        train(dataset, TINY, tmp_path, resume=True, progress=False)
+        train(source, TINY, tmp_path, resume=True, progress=False)
 
 
 def test_unknown_device() -> None:
@@ -232,26 +242,26 @@ def test_adaptive_shares_of_a_recipe() -> None:
 @pytest.mark.parametrize(
     "options", [{"precision": "bfloat16"}, {"self_attention": True, "widths": [8, 8, 8, 8]}]
 )
-def test_variants_train(dataset: Dataset, tmp_path: Path, options: dict[str, Any]) -> None:
+def test_variants_train(source: DatasetSource, tmp_path: Path, options: dict[str, Any]) -> None:
     config = TINY.updated({"epochs": 1, "discriminator_width": 8, **options})
-    result = train(dataset, config, tmp_path, device="cpu", progress=False)
+    result = train(source, config, tmp_path, device="cpu", progress=False)
     weights = load_checkpoint(result["checkpoint"])["networks"]["generator"]
     assert all(value.dtype != torch.bfloat16 for value in weights.values())
 
 
 def test_tensorboard_is_optional(
-    dataset: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    source: DatasetSource, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", None)
     with pytest.raises(MissingDependencyError, match=r"cbagan-ompl\[tensorboard\]"):
-        train(dataset, TINY, tmp_path, device="cpu", progress=False, tensorboard=True)
+        train(source, TINY, tmp_path, device="cpu", progress=False, tensorboard=True)
 
 
-def test_tensorboard_gets_losses_and_scores(dataset: Dataset, tmp_path: Path) -> None:
+def test_tensorboard_gets_losses_and_scores(source: DatasetSource, tmp_path: Path) -> None:
     pytest.importorskip("tensorboard")
     from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-    train(dataset, TINY, tmp_path, device="cpu", progress=False, tensorboard=True)
+    train(source, TINY, tmp_path, device="cpu", progress=False, tensorboard=True)
     events = EventAccumulator(str(tmp_path)).Reload()
     history = load_checkpoint(tmp_path / "last.pt")["history"]
     for group, name in (("validation", "iou"), ("losses", "pixel")):
@@ -383,7 +393,7 @@ def test_images_of_a_size_that_the_networks_cannot_take(dataset: Dataset, tmp_pa
     cut = replace(dataset.train, maps=dataset.train.maps[:, :20, :20])
     cut = replace(cut, region=cut.region[:, :20, :20])
     with pytest.raises(DatasetError, match="a multiple of 16 pixels; these have 20"):
-        train(replace(dataset, train=cut), TINY, tmp_path, device="cpu", progress=False)
+        train(source_of(replace(dataset, train=cut)), TINY, tmp_path, device="cpu", progress=False)
 
 
 def test_missing_folder(tmp_path: Path) -> None:
