@@ -18,6 +18,25 @@ def test_bce_is_summed_over_two_directions() -> None:
     assert losses.bce_loss(P, T).item() == pytest.approx(2 * BCE, rel=1e-6)
 
 
+def test_positive_weight_is_a_factor_of_the_regions_part() -> None:
+    expected = -(3 * log(0.9) + log(0.8) + log(0.5) + 3 * log(0.5)) / 4
+    assert losses.bce_loss(P, T, 3.0).item() == pytest.approx(2 * expected, rel=1e-6)
+    soft = torch.full((1, 1, 1, 1), 0.25)
+    expected = -(3 * 0.25 * log(0.1) + 0.75 * log(0.9))
+    assert losses.bce_loss(torch.full_like(soft, 0.1), soft, 3.0).item() == pytest.approx(
+        2 * expected, rel=1e-6
+    )
+
+
+def test_positive_weight_leaves_a_loss_of_certain_errors_finite() -> None:
+    predicted = torch.tensor([[[[0.0, 1.0]]]], requires_grad=True)
+    loss = losses.bce_loss(predicted, torch.tensor([[[[1.0, 0.0]]]]), 2.0)
+    assert loss.item() == pytest.approx(2 * (2 * 100 + 100) / 2)
+    loss.backward()
+    assert predicted.grad is not None
+    assert predicted.grad.isfinite().all()
+
+
 def test_dice_per_image() -> None:
     assert losses.dice_loss(P, T).item() == pytest.approx(DICE, rel=1e-6)
 
@@ -62,3 +81,8 @@ def test_generator_loss_weights() -> None:
 def test_adaptive_shares_follow_the_errors_of_the_discriminators() -> None:
     assert losses.adaptive_shares(0.2, 0.4, alpha=3.0) == pytest.approx((0.6, 0.4))
     assert losses.adaptive_shares(0.5, 0.5, alpha=1.0) == pytest.approx((0.5, 0.5))
+
+
+def test_adaptive_shares_of_discriminators_without_error() -> None:
+    assert losses.adaptive_shares(0.0, 0.0, alpha=3.0) == pytest.approx((0.75, 0.25))
+    assert losses.adaptive_shares(0.0, 0.1, alpha=3.0) == (0, 1)

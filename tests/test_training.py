@@ -4,6 +4,7 @@ import argparse
 import json
 import subprocess
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,11 +18,16 @@ torch = pytest.importorskip("torch")
 
 from cbagan_ompl import ConfigError, DatasetError, MissingDependencyError, ModelError  # noqa: E402
 from cbagan_ompl.datasets.layout import Dataset, load_dataset  # noqa: E402
-from cbagan_ompl.network import training  # noqa: E402
+from cbagan_ompl.network import losses, networks, training  # noqa: E402
 from cbagan_ompl.network.checkpoints import load_checkpoint  # noqa: E402
 from cbagan_ompl.network.cli import add_export_parser, add_train_parser  # noqa: E402
 from cbagan_ompl.network.config import TrainingConfig  # noqa: E402
 from cbagan_ompl.network.dataset import make_batch, transformed  # noqa: E402
+from cbagan_ompl.network.distributed import (  # noqa: E402
+    GlobalBatchNorm,
+    ProcessGroup,
+)
+from cbagan_ompl.network.encoding import region_probability  # noqa: E402
 from cbagan_ompl.network.networks import Networks, encode  # noqa: E402
 from cbagan_ompl.network.schedule import learning_rate_factor, plateau_factor  # noqa: E402
 from cbagan_ompl.network.sources import DatasetSource  # noqa: E402
@@ -107,6 +113,18 @@ def test_the_discriminators_reach_the_generator(dataset: Dataset) -> None:
     fake = networks.generator(images.map, images.points, torch.zeros_like(batch.free))
     generator_step(networks, config, batch, images, fake, (0.5, 0.5))
     assert changed(before, weights(networks)["generator"])
+
+
+def test_the_recipes_weights_reach_the_segmentation_loss(dataset: Dataset) -> None:
+    weights = {"bce_weight": 2, "dice_weight": 3, "dice_smooth": 4, "positive_weight": 5}
+    config = TINY.updated(weights)
+    networks = Networks(config, CPU)
+    batch = make_batch(dataset.train, np.arange(4), CPU)
+    images = encode(batch)
+    fake = networks.generator(images.map, images.points, torch.zeros_like(batch.free))
+    expected = losses.segmentation_loss(region_probability(fake), batch.region, 2, 3, 4, 5).item()
+    parts = generator_step(networks, config, batch, images, fake, None)
+    assert parts["segmentation"] == pytest.approx(expected)
 
 
 def test_average_follows_the_generator() -> None:
@@ -202,6 +220,32 @@ def test_unknown_device() -> None:
         training.pick_device("nonsense")
 
 
+@pytest.mark.parametrize(
+    ("name", "rank", "expected"), [("auto", "1", 1), ("cuda", "2", 2), ("cuda:0", "1", 0)]
+)
+def test_each_process_has_its_own_gpu(
+    monkeypatch: pytest.MonkeyPatch, name: str, rank: str, expected: int
+) -> None:
+    placed, current = [], []
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    monkeypatch.setattr(torch.cuda, "set_device", current.append)
+    monkeypatch.setattr(networks.torch, "empty", lambda *_, device: placed.append(device))
+    monkeypatch.setenv("LOCAL_RANK", rank)
+    device = networks.pick_device(name)
+    assert device == torch.device("cuda", expected)
+    assert placed == current == [device]
+
+
+def test_one_process_takes_the_first_gpu_or_the_cpu(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("LOCAL_RANK", raising=False)
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    assert networks.pick_device("auto") == CPU
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    monkeypatch.setattr(torch.cuda, "set_device", lambda device: None)
+    monkeypatch.setattr(networks.torch, "empty", lambda *_, device: None)
+    assert networks.pick_device("auto") == torch.device("cuda", 0)
+
+
 def test_learning_rates() -> None:
     cycle = [learning_rate_factor(TINY.updated({"epochs": 10}), step, 10) for step in range(100)]
     assert max(cycle) == cycle[10] == 1
@@ -277,6 +321,41 @@ def torchrun(processes: int, *words: str) -> None:
     command += [f"--nproc-per-node={processes}", *words]
     done = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.fixture
+def alone(tmp_path: Path) -> Iterator[None]:
+    """A group of this process only."""
+    store = (tmp_path / "store").as_uri()
+    torch.distributed.init_process_group("gloo", init_method=store, rank=0, world_size=1)
+    yield
+    torch.distributed.destroy_process_group()
+
+
+@pytest.mark.usefixtures("alone")
+@pytest.mark.parametrize(("kind", "tolerance"), [(torch.float32, 1e-5), (torch.bfloat16, 1e-2)])
+def test_global_batch_norm_is_batch_norm(kind: torch.dtype, tolerance: float) -> None:
+    features = (3 + 2 * torch.randn(4, 5, 6, 7)).to(kind)
+    results = []
+    for norm in (torch.nn.BatchNorm2d(5), GlobalBatchNorm(5)):
+        taken = features.clone().requires_grad_()
+        normal = norm(taken)
+        (normal * torch.linspace(-1, 1, 7)).sum().backward()
+        results.append([normal, taken.grad, norm.running_mean, norm.running_var])
+    for expected, value in zip(*results, strict=True):
+        assert value.dtype == expected.dtype
+        torch.testing.assert_close(value, expected, rtol=tolerance, atol=tolerance)
+
+
+@pytest.mark.parametrize(("tasks", "size"), [(15, 14), (16, 16), (40, 32), (2, 2)])
+def test_all_processes_have_as_many_tasks(tasks: int, size: int) -> None:
+    group = ProcessGroup(1, 2)
+    assert training._batch_size(tasks, TINY.updated({"batch_size": 32}), group) == size
+
+
+def test_too_few_tasks_for_the_processes() -> None:
+    with pytest.raises(ConfigError, match="4 processes cannot share 3 training tasks"):
+        training._batch_size(3, TINY, ProcessGroup(0, 4))
 
 
 def test_two_processes_have_the_gradients_of_one(folder: Path, tmp_path: Path) -> None:
@@ -431,6 +510,9 @@ def test_config_file_round_trip(tmp_path: Path, suffix: str) -> None:
         ("plateau_factor: 2", "plateau_factor must be above 0"),
         ("generator_lr: fast", "generator_lr"),
         ("beta1: .nan", "beta1"),
+        ("seed: -1", "seed must be at least 0"),
+        ("seed: 99999999999999999999", r"seed must be below 2\*\*63"),
+        ("{self_attention: true, widths: [8, 8, 7, 8]}", "all widths but the first .* least 8"),
         ("[1, 2]", "holds lines such as"),
         ("a: [", "neither JSON nor YAML"),
     ],
@@ -447,6 +529,13 @@ def test_unreadable_config_and_unknown_preset(tmp_path: Path) -> None:
         TrainingConfig.from_file(tmp_path / "none.yaml")
     with pytest.raises(ConfigError, match="best, paper"):
         TrainingConfig.preset("worst")
+
+
+def test_the_greatest_seed() -> None:
+    config = TINY.updated({"seed": 2**63 - 1})
+    Networks(config, CPU)
+    torch.Generator().manual_seed(config.seed)
+    np.random.default_rng(config.seed)
 
 
 def test_numbers_that_yaml_reads_as_text() -> None:

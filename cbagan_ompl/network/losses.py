@@ -23,8 +23,8 @@ def bce_loss(predicted: Tensor, target: Tensor, positive_weight: float = 1.0) ->
     """
     loss = functional.binary_cross_entropy(predicted, target)
     if positive_weight != 1:
-        # The same bound of the logarithm as PyTorch's.
-        missed = -(target * predicted.log().clamp(min=-100)).mean()
+        # -target log(predicted), with PyTorch's bounds of the logarithm and of its gradient.
+        missed = functional.binary_cross_entropy(predicted, torch.ones_like(target), target)
         loss = loss + (positive_weight - 1) * missed
     return 2 * loss
 
@@ -105,6 +105,9 @@ def adaptive_shares(map_loss: float, point_loss: float, alpha: float) -> tuple[f
         point_loss: the same of the point discriminator.
         alpha: factor on the map discriminator's share.
     """
+    if map_loss == point_loss == 0:
+        # Equal errors, as in the limit of ever smaller ones.
+        map_loss = point_loss = 1.0
     total = alpha * map_loss + point_loss
     return alpha * map_loss / total, point_loss / total
 

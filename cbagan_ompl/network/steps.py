@@ -69,6 +69,7 @@ def generator_step(
             config.bce_weight,
             config.dice_weight,
             config.dice_smooth,
+            config.positive_weight,
         ),
     }
     judges = (networks.map_discriminator, networks.point_discriminator)
