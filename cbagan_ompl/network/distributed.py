@@ -87,9 +87,12 @@ class GlobalBatchNorm(nn.BatchNorm2d):
     """
 
     def forward(self, features: Tensor) -> Tensor:
-        """Features of the same shape (B, C, H, W)."""
+        """Features of the same shape (B, C, H, W), and of the same type."""
         if not self.training:
             return super().forward(features)
+        kind = features.dtype
+        # The running statistics are float32, and means over many values would lose digits in less.
+        features = features.float()
         count = distributed.get_world_size() * features.numel() // features.shape[1]
         mean = _mean(features)
         deviation = features - mean.view(1, -1, 1, 1)
@@ -104,7 +107,7 @@ class GlobalBatchNorm(nn.BatchNorm2d):
             self.num_batches_tracked += 1
         scale = self.weight * torch.rsqrt(variance + self.eps)
         shifted: Tensor = deviation * scale.view(1, -1, 1, 1) + self.bias.view(1, -1, 1, 1)
-        return shifted
+        return shifted.to(kind)
 
 
 def _mean(features: Tensor) -> Tensor:

@@ -166,18 +166,23 @@ def encode(batch: Batch) -> Images:
 
 
 def pick_device(name: str) -> torch.device:
-    """The device of a name; ``auto`` is a GPU if there is one, each process its own.
+    """The device of a name; ``auto`` is a GPU if there is one.
+
+    Of the processes that ``torchrun`` starts on a machine each gets its own GPU, unless the name
+    has a number. The GPU is made the current one, through which the processes talk.
 
     Raises:
         ConfigError: no such device.
     """
     if name == "auto":
-        if not torch.cuda.is_available():
-            return torch.device("cpu")
-        name = f"cuda:{os.environ.get('LOCAL_RANK', '0')}"
+        name = "cuda" if torch.cuda.is_available() else "cpu"
     try:
         device = torch.device(name)
+        if device.type == "cuda" and device.index is None:
+            device = torch.device("cuda", int(os.environ.get("LOCAL_RANK", "0")))
         torch.empty(1, device=device)
+        if device.type == "cuda":
+            torch.cuda.set_device(device)
     except (RuntimeError, AssertionError) as error:
         raise ConfigError(f"cannot use device {name!r}: {error}") from error
     return device

@@ -20,7 +20,7 @@ from ..errors import ConfigError
 from .checkpoints import BEST, LAST, SCHEMA, best_generator, load_checkpoint, save_atomically
 from .config import TrainingConfig
 from .dataset import Batch, check_trainable, make_batch
-from .distributed import process_group
+from .distributed import ProcessGroup, process_group
 from .evaluation import evaluate, trivial_scores
 from .networks import Networks, encode, pick_device
 from .scalars import scalar_log, write_scalars
@@ -98,8 +98,8 @@ def train(
 
     Raises:
         ConfigError: ``resume`` with another recipe or other tasks, or without it although the
-            folder holds a run; the folder cannot be made; no such device; the loss is not finite; or the
-            processes cannot share a batch evenly.
+            folder holds a run; the folder cannot be made; no such device; the loss is not finite;
+            or the processes cannot share a batch evenly.
         DatasetError: the images are of a size that the networks cannot take.
         MissingDependencyError: ``tensorboard`` without the package of that name.
         ModelError: a checkpoint that cannot be read.
@@ -183,8 +183,9 @@ def _train_epoch(
 ) -> dict[str, float]:
     """Means of the losses over the steps in which they were computed."""
     order = run.rng.permutation(len(tasks))
+    size = _batch_size(len(order), config, run.networks.group)
     # The tasks that fill no batch wait for the next epoch, which has another order.
-    steps = max(1, len(order) // config.batch_size)
+    steps = len(order) // size
     plateau = plateau_factor(config, [entry["validation"]["iou"] for entry in run.history])
     totals: dict[str, list[float]] = {}
     run.networks.generator.train()
@@ -192,7 +193,7 @@ def _train_epoch(
     for i in bar:
         step = epoch * steps + i
         run.networks.set_learning_rates(plateau * learning_rate_factor(config, step, steps))
-        indices = order[i * config.batch_size : (i + 1) * config.batch_size]
+        indices = order[i * size : (i + 1) * size]
         values = _step(run, config, tasks, indices, device, step)
         if not all(math.isfinite(value) for value in values.values()):
             raise ConfigError(
@@ -203,6 +204,15 @@ def _train_epoch(
             totals.setdefault(name, []).append(value)
         bar.set_postfix(segmentation=f"{values['segmentation']:.3f}")
     return {name: float(np.mean(entries)) for name, entries in totals.items()}
+
+
+def _batch_size(tasks: int, config: TrainingConfig, group: ProcessGroup) -> int:
+    """Tasks in a batch: where there are too few, what all processes can have the same number of."""
+    size = min(tasks, config.batch_size)
+    size -= size % group.size
+    if size == 0:
+        raise ConfigError(f"{group.size} processes cannot share {tasks} training tasks")
+    return size
 
 
 def _step(
