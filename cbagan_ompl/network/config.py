@@ -110,8 +110,7 @@ class TrainingConfig:
         Raises:
             ConfigError: a value that makes no sense; the message names the option.
         """
-        if len(self.widths) != 4 or min(self.widths) < 1:
-            raise ConfigError(f"widths are four positive channel counts, got {self.widths}")
+        self._check_widths()
         for name, choices in (("schedule", SCHEDULES), ("precision", PRECISIONS)):
             if getattr(self, name) not in choices:
                 raise ConfigError(
@@ -133,6 +132,17 @@ class TrainingConfig:
                 ("_weight", "_decay", "_smooth", "_alpha", "_patience", "metrics", "seed")
             ):
                 self._check(field.name, getattr(self, field.name) >= 0, "at least 0")
+        self._check("seed", self.seed < 2**63, "below 2**63")
+
+    def _check_widths(self) -> None:
+        if len(self.widths) != 4 or min(self.widths) < 1:
+            raise ConfigError(f"widths are four positive channel counts, got {self.widths}")
+        # The queries of self-attention have an eighth of the channels.
+        if self.self_attention and min(self.widths[1:]) < 8:
+            raise ConfigError(
+                "with self_attention all widths but the first must be at least 8, "
+                f"got {self.widths}"
+            )
 
     def _check(self, name: str, holds: bool, rule: str) -> None:
         if not holds:
