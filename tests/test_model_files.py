@@ -213,7 +213,21 @@ def broken_record(path: Path) -> None:
         ),
         (
             lambda path: rewrite_record(path, lambda record: record.pop("working_size")),
-            "lacks schema or working_size",
+            "lacks working_size",
+        ),
+        (
+            lambda path: rewrite_record(path, lambda record: record.update(working_size=0)),
+            "lacks working_size",
+        ),
+        (lambda path: rewrite_record(path, lambda record: record.pop("schema")), "lacks schema"),
+        (lambda path: rewrite_record(path, lambda record: record.pop("name")), "lacks name"),
+        (
+            lambda path: rewrite_record(path, lambda record: record.update(parameters="many")),
+            "lacks parameters",
+        ),
+        (
+            lambda path: rewrite_record(path, lambda record: record.clear()),
+            "lacks schema, working_size, name, parameters",
         ),
     ],
 )

@@ -24,6 +24,9 @@ MANIFEST = "manifest.json"
 RECORD_NAME = "cbagan_ompl.json"
 RECORD_SCHEMA = 1
 
+# What every record of this version has, with its type.
+_REQUIRED = {"schema": int, "working_size": int, "name": str, "parameters": int}
+
 _EXPORT_HINT = "export one with: cbagan-ompl export CHECKPOINT --output MODEL.pt"
 
 
@@ -170,15 +173,18 @@ def _parse_record(path: Path, text: bytes) -> dict[str, Any]:
         record = json.loads(text)
     except ValueError as error:
         raise ModelError(f"{path}: the record {RECORD_NAME} is damaged ({error})") from error
-    schema = record.get("schema") if isinstance(record, dict) else None
-    size = record.get("working_size") if isinstance(record, dict) else None
-    if type(schema) is not int or type(size) is not int or size < 1:
-        raise ModelError(
-            f"{path}: the record {RECORD_NAME} lacks schema or working_size; export the model again"
-        )
-    if schema > RECORD_SCHEMA:
+    record = record if isinstance(record, dict) else {}
+    schema = record.get("schema")
+    if type(schema) is int and schema > RECORD_SCHEMA:
         raise ModelError(
             f"{path}: the model's record has version {schema}, this package understands up to "
             f"{RECORD_SCHEMA}; install a newer cbagan-ompl (pip install -U cbagan-ompl)"
+        )
+    wrong = [name for name, kind in _REQUIRED.items() if type(record.get(name)) is not kind]
+    if not wrong and record["working_size"] < 1:
+        wrong = ["working_size"]
+    if wrong:
+        raise ModelError(
+            f"{path}: the record {RECORD_NAME} lacks {', '.join(wrong)}; export the model again"
         )
     return dict(record)
