@@ -280,6 +280,18 @@ def test_what_is_no_set(tmp_path: Path) -> None:
         read_set(tmp_path / "empty.tar")
 
 
+def test_tar_archives_need_a_python_that_unpacks_them_safely(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    root = write_training_set(tmp_path / "set")
+    with tarfile.open(tmp_path / "set.tar", "w") as tar:
+        tar.add(root, "set")
+    assert read_set(tmp_path / "set.tar").name == "set"
+    monkeypatch.delattr(tarfile, "data_filter")
+    with pytest.raises(DatasetError, match=r"3\.10\.12.*unpack it yourself, and give the folder"):
+        read_set(tmp_path / "set.tar")
+
+
 def test_archives_that_are_damaged_or_ambiguous(tmp_path: Path) -> None:
     root = write_training_set(tmp_path / "set")
     for name, folders in (("two.zip", ("a", "b")), ("one.zip", (".",))):

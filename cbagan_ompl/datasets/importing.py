@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 import tarfile
 import zipfile
 import zlib
@@ -54,6 +55,12 @@ def _unpack(path: Path, folder: Path) -> None:
                 zipped.extractall(folder)  # leaves out what would lead out of the folder
             return
         with tarfile.open(path) as archive:
+            if not hasattr(tarfile, "data_filter"):
+                raise DatasetError(
+                    f"{path}: Python {platform.python_version()} cannot keep a tar archive from "
+                    "writing outside its folder (3.10.12, 3.11.4 and newer can); unpack it "
+                    "yourself, and give the folder"
+                )
             archive.extractall(folder, filter="data")
     except _UNREADABLE as error:
         reason = getattr(error, "strerror", None) or error
