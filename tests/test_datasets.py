@@ -39,6 +39,7 @@ from cbagan_ompl.datasets.pool import run_all
 from cbagan_ompl.datasets.splits import is_test_task
 from cbagan_ompl.evaluation.metrics import joins
 from cbagan_ompl.gridmap import GridMap
+from cbagan_ompl.map_families import FAMILIES, MIN_SIDE
 from cbagan_ompl.planning.labels import rrt_region
 
 SMALL = GenerationSettings(maps=6, tasks=3, copies=2, runs=3, families=("blocks", "triangles"))
@@ -83,6 +84,16 @@ def test_an_interrupted_run_goes_on_to_the_same_files(folder: Path, tmp_path: Pa
     (path / "tasks/map_4/task_1_roi.png").write_bytes(b"half a file")
     generate(path, SMALL, jobs=1, resume=True, progress=False)
     assert_same_files(folder, path)
+
+
+@pytest.mark.parametrize("size", [MIN_SIDE, 64])
+def test_sets_of_all_families(tmp_path: Path, size: int) -> None:
+    settings = GenerationSettings(maps=len(FAMILIES), tasks=1, size=size, runs=1)
+    assert settings.families == tuple(FAMILIES)
+    generate(tmp_path / "set", settings, jobs=1, resume=False, progress=False)
+    made = load_dataset(tmp_path / "set")
+    assert len(made.train) + len(made.test) == len(FAMILIES)
+    assert len(np.unique(made.train.maps, axis=0)) == len(FAMILIES)
 
 
 def test_another_seed_gives_other_maps_tasks_and_labels(dataset: Dataset, tmp_path: Path) -> None:
@@ -135,7 +146,7 @@ def test_a_folder_with_a_set_is_not_overwritten(folder: Path, tmp_path: Path) ->
     [
         ("maps", 0, "maps must be at least 1"),
         ("size", 40, "at least 48 pixels, got 40"),
-        ("families", ("blocks", "castles"), "'castles'; there are blocks"),
+        ("families", ("blocks", "castles"), "'castles'; there are blocked_cells, blocks, bug_trap"),
         ("range", -1.0, "range must be above 0"),
         ("min_distance", 1.0, "min_distance"),
         ("test_fraction", 1.5, "1.5"),

@@ -11,6 +11,7 @@ import pytest
 from cbagan_ompl.errors import ConfigError
 from cbagan_ompl.gridmap import GridMap
 from cbagan_ompl.map_families import FAMILIES, MIN_SIDE, bug_trap, narrow_passage
+from cbagan_ompl.map_families.variation import world_map
 from cbagan_ompl.mapfiles import bundled_folder, bundled_maps
 
 SCRIPT = Path(__file__).resolve().parents[1] / "benchmarks" / "make_bundled_maps.py"
@@ -24,15 +25,59 @@ def script():
     return module
 
 
-@pytest.mark.parametrize("family", FAMILIES)
-@pytest.mark.parametrize(("width", "height"), [(MIN_SIDE, MIN_SIDE), (64, 150), (220, 96)])
+#: Least and greatest free share of the families whose measures do not follow the side of the map.
+SHARES = {
+    "blocked_cells": (0.3, 0.97),
+    "caves": (0.05, 0.81),
+    "cell_maze": (0.4, 0.98),
+    "city": (0.15, 0.98),
+    "curved_walls": (0.2, 0.99),
+    "halls": (0.1, 0.9),
+    "offices": (0.4, 0.99),
+    "race_track": (0.04, 0.4),
+    "room_grid": (0.6, 0.98),
+    "shelves": (0.35, 0.99),
+}
+FOLLOWING = sorted(set(FAMILIES) - set(SHARES))
+SIZES = [(MIN_SIDE, MIN_SIDE), (64, 150), (220, 96)]
+
+
+def checked(family, seed, width, height):
+    """A map that has the right shape, and whose free pixels are all connected."""
+    free = FAMILIES[family](np.random.default_rng(seed), width, height)
+    assert free.shape == (height, width)
+    assert free.dtype == np.bool_
+    assert GridMap(free).components.max() == 1
+    return free
+
+
+def test_every_family_is_tested_for_its_free_share():
+    assert set(SHARES) < set(FAMILIES)
+    assert len(FOLLOWING) == 11
+
+
+@pytest.mark.parametrize("family", SHARES)
+@pytest.mark.parametrize(("width", "height"), [*SIZES, (64, 64), (256, 256)])
+def test_families_of_every_scale(family, width, height):
+    least, most = SHARES[family]
+    for seed in range(8):
+        assert least < checked(family, seed, width, height).mean() < most
+
+
+@pytest.mark.parametrize("family", ["offices", "shelves"])
+def test_no_map_is_all_free(family):
+    # Of so many small maps some would have room for neither walls nor shelves.
+    for seed in range(200):
+        free = FAMILIES[family](np.random.default_rng(seed), MIN_SIDE, MIN_SIDE)
+        assert 0.35 < free.mean() < 0.995
+
+
+@pytest.mark.parametrize("family", FOLLOWING)
+@pytest.mark.parametrize(("width", "height"), SIZES)
 def test_families_at_every_size(family, width, height):
     for seed in range(6):
-        free = FAMILIES[family](np.random.default_rng(seed), width, height)
-        assert free.shape == (height, width)
-        assert free.dtype == np.bool_
+        free = checked(family, seed, width, height)
         assert 0.4 < free.mean() < 0.95
-        assert GridMap(free).components.max() == 1  # all that is free is connected
         # No part of the map has been walled off and filled.
         for part in (*np.array_split(free, 3, axis=0), *np.array_split(free, 3, axis=1)):
             assert part.mean() > 0.25
@@ -44,6 +89,27 @@ def test_families_are_random_and_reproducible(family):
     first = draw(np.random.default_rng(1), 96, 96)
     np.testing.assert_array_equal(first, draw(np.random.default_rng(1), 96, 96))
     assert (first != draw(np.random.default_rng(2), 96, 96)).any()
+
+
+@pytest.mark.parametrize("side", [MIN_SIDE, 64, 100])
+def test_world_maps(side):
+    seen = set()
+    for seed in range(40):
+        free = world_map(np.random.default_rng(seed), side, tuple(FAMILIES))
+        assert free.shape == (side, side)
+        assert free.dtype == np.bool_
+        assert 0.12 <= free.mean() < 1
+        assert GridMap(free).components.max() == 1
+        seen.add(free.tobytes())
+        again = world_map(np.random.default_rng(seed), side, tuple(FAMILIES))
+        np.testing.assert_array_equal(free, again)
+    assert len(seen) == 40
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_world_maps_of_one_family(family):
+    free = world_map(np.random.default_rng(0), 64, (family,))
+    assert free.shape == (64, 64)
 
 
 @pytest.mark.parametrize("seed", range(5))

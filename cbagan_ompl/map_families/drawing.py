@@ -20,8 +20,8 @@ MIN_SIDE = 48
 WALL = 3
 
 
-def canvas(width: int, height: int) -> tuple[Mask, float]:
-    """A free map and the unit of length, 4 pixels where the shorter side is 256.
+def check_sides(width: int, height: int) -> None:
+    """Refuse maps that are too small.
 
     Raises:
         ConfigError: a side is shorter than :data:`MIN_SIDE`.
@@ -30,6 +30,15 @@ def canvas(width: int, height: int) -> tuple[Mask, float]:
         raise ConfigError(
             f"maps are drawn from {MIN_SIDE} pixels a side up, got {width} x {height}"
         )
+
+
+def canvas(width: int, height: int) -> tuple[Mask, float]:
+    """A free map and the unit of length, 4 pixels where the shorter side is 256.
+
+    Raises:
+        ConfigError: a side is shorter than :data:`MIN_SIDE`.
+    """
+    check_sides(width, height)
     return np.ones((height, width), dtype=np.bool_), min(width, height) / 64
 
 

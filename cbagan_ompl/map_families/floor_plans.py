@@ -45,6 +45,8 @@ def offices(rng: np.random.Generator, width: int, height: int) -> Mask:
     while waiting:
         place = waiting.pop()
         waiting += _divide(free, place, rng, wall, door, smallest, corridors)
+    if free.all():  # a single room
+        return offices(rng, width, height)
     _furnish(free, rng, rng.uniform(0, 0.06))
     return without_pockets(free)
 
@@ -62,6 +64,8 @@ def shelves(rng: np.random.Generator, width: int, height: int) -> Mask:
         for left in range(margin + cross, room.shape[1] - margin - 4, long + cross):
             if rng.random() >= missing:
                 room[top : top + thick, left : left + long] = False
+    if free.all():  # no shelf has found room, or all are missing
+        return shelves(rng, width, height)
     return without_pockets(free)
 
 

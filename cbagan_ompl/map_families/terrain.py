@@ -9,17 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from .drawing import Mask, box, empty_map, scale_of, without_pockets
+from .drawing import Mask, box, check_sides, empty_map, scale_of, without_pockets
 
 
 def caves(rng: np.random.Generator, width: int, height: int) -> Mask:
     """Caves: smooth noise, free where it is high."""
+    check_sides(width, height)
     noise = _noise(rng, width, height, scale_of(rng, 2, min(width, height) / 12))
     return without_pockets(noise > np.quantile(noise, rng.uniform(0.2, 0.55)))
 
 
 def curved_walls(rng: np.random.Generator, width: int, height: int) -> Mask:
     """Thin walls along the level lines of smooth noise, with gaps."""
+    check_sides(width, height)
     scale = scale_of(rng, 5, min(width, height) / 8)
     noise = _noise(rng, width, height, scale)
     slope = np.hypot(*np.gradient(noise)) + 1e-9
@@ -48,6 +50,7 @@ def city(rng: np.random.Generator, width: int, height: int) -> Mask:
 
 def race_track(rng: np.random.Generator, width: int, height: int) -> Mask:
     """A closed course with bends in solid ground, now and then with a shortcut."""
+    check_sides(width, height)
     count = int(rng.integers(6, 13))
     angles = np.sort(rng.uniform(0, 2 * pi, count))
     radius = rng.uniform(0.35, 0.95, count)
@@ -65,6 +68,7 @@ def race_track(rng: np.random.Generator, width: int, height: int) -> Mask:
 
 def blocked_cells(rng: np.random.Generator, width: int, height: int) -> Mask:
     """Square cells, each blocked with the same probability."""
+    check_sides(width, height)
     side = scale_of(rng, 1, min(width, height) / 32)
     shape = -(-height // side), -(-width // side)
     cells = rng.random(shape) >= rng.uniform(0.05, 0.35)

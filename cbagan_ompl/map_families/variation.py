@@ -39,7 +39,9 @@ def world_map(rng: np.random.Generator, side: int, families: Sequence[str]) -> M
 
 def _drawn(rng: np.random.Generator, family: str, side: int) -> Mask:
     """A map of the family with a longer side of at most ``side`` pixels, enlarged to it."""
-    long = int(rng.integers(MIN_SIDE, side)) if rng.random() < _COARSE else side
+    # The smallest map has no coarser one.
+    most = max(side, MIN_SIDE + 1)
+    long = int(rng.integers(MIN_SIDE, most)) if rng.random() < _COARSE else side
     short = (
         int(rng.integers(max(MIN_SIDE, long // 2), long + 1)) if rng.random() < _NARROW else long
     )
