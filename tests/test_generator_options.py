@@ -1,0 +1,131 @@
+"""Patches, wavefronts and white obstacles of the generator."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+import pytest
+
+torch = pytest.importorskip("torch")
+
+from cbagan_ompl import ConfigError, DatasetError  # noqa: E402
+from cbagan_ompl.network.config import TrainingConfig  # noqa: E402
+from cbagan_ompl.network.dataset import check_trainable  # noqa: E402
+from cbagan_ompl.network.discriminators import Discriminator  # noqa: E402
+from cbagan_ompl.network.encoding import map_image, point_image  # noqa: E402
+from cbagan_ompl.network.export import RegionModel, save_script  # noqa: E402
+from cbagan_ompl.network.generator import Generator, stride_of  # noqa: E402
+from cbagan_ompl.network.networks import make_generator  # noqa: E402
+
+CONFIG = TrainingConfig(
+    widths=(8, 8, 12, 16), stem=12, patch=4, metrics=3, white_obstacles=True, discriminator_width=4
+)
+
+
+def generator(**options: object) -> Generator:
+    torch.manual_seed(0)
+    return make_generator(CONFIG.updated(options)).eval()
+
+
+def images(free: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    """Inputs for maps (B, 1, H, W) whose tasks lead from corner to corner."""
+    height, width = free.shape[-2:]
+    start = torch.full((len(free), 2), 3.5)
+    goal = torch.tensor([width - 3.5, height - 3.5]).expand(len(free), 2)
+    points = point_image(start, goal, height, width)
+    return map_image(free), points, torch.zeros_like(free)
+
+
+def clutter(*shape: int) -> torch.Tensor:
+    return (torch.rand(shape, generator=torch.Generator().manual_seed(1)) > 0.2).float()
+
+
+@pytest.mark.parametrize(("height", "width"), [(64, 64), (64, 128)])
+def test_the_image_has_the_size_of_the_map_and_white_obstacles(height: int, width: int) -> None:
+    free = clutter(2, 1, height, width)
+    image = generator()(*images(free))
+    assert image.shape == (2, 3, height, width)
+    obstacles = (free == 0).expand_as(image)
+    assert (image[obstacles] == 1).all()
+    assert (image[~obstacles].abs() < 1).all()
+    assert (generator(white_obstacles=False)(*images(free))[obstacles] != 1).all()
+
+
+def test_the_exported_model_gives_obstacles_no_probability() -> None:
+    free = clutter(1, 1, 50, 70)
+    start, goal = torch.tensor([[3.5, 3.5]]), torch.tensor([[60.5, 40.5]])
+    probability = RegionModel(generator())(free, start, goal)
+    assert probability.shape == free.shape
+    assert (probability[free == 0] == 0).all()
+    assert (probability[free == 1] > 0).all()
+
+
+@pytest.mark.parametrize(("height", "width"), [(64, 64), (75, 130)])
+def test_eager_scripted_and_reloaded_agree(tmp_path: Path, height: int, width: int) -> None:
+    eager = RegionModel(generator()).eval()
+    assert eager.stride == 64
+    save_script(eager, tmp_path / "model.pt", {})
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        models = (torch.jit.script(eager), torch.jit.load(str(tmp_path / "model.pt")))
+    free, start = clutter(2, 1, height, width), torch.tensor([[5.2, 60.9], [30.0, 2.0]])
+    with torch.inference_mode():
+        expected = eager(free, start, start.flip(0))
+        assert expected.shape == free.shape
+        for model in models:
+            output = model(free, start, start.flip(0))
+            torch.testing.assert_close(output, expected, rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize("metrics", [0, 3])
+def test_every_pixel_of_a_patch_matters(metrics: int) -> None:
+    # Sixteen maps, in each of which another pixel of one patch is blocked.
+    free = torch.ones(17, 1, 64, 64)
+    for pixel in range(16):
+        free[1 + pixel, 0, 32 + pixel // 4, 20 + pixel % 4] = 0
+    outputs = generator(metrics=metrics)(*images(free))
+    # What obstacles paint white themselves does not count.
+    outputs[:, :, 32:36, 20:24] = 0
+    for i in range(17):
+        for j in range(i):
+            assert not torch.equal(outputs[i], outputs[j])
+
+
+def test_points_and_noise_matter_to_the_pixel() -> None:
+    model, (of_map, points, noise) = generator(), images(torch.ones(1, 1, 64, 64))
+    points.requires_grad_()
+    noise.requires_grad_()
+    weights = torch.rand(1, 3, 64, 64, generator=torch.Generator().manual_seed(0))
+    (model(of_map, points, noise) * weights).sum().backward()
+    for inputs in (points, noise):
+        assert inputs.grad is not None
+        assert (inputs.grad != 0).float().mean() > 0.99
+
+
+def test_the_default_options_are_the_papers_generator() -> None:
+    assert (TrainingConfig().stem, TrainingConfig().patch, TrainingConfig().metrics) == (16, 1, 0)
+    model = generator(patch=1, metrics=0)
+    assert model.wavefront is None
+    assert model.map_stem.kernel_size == (3, 3)
+
+
+def test_discriminators_see_patches_as_places() -> None:
+    inputs = torch.zeros(2, 3, 64, 64)
+    logits = Discriminator(4, patch=4)(inputs, inputs)
+    assert logits.shape == Discriminator(4)(inputs[..., :16, :16], inputs[..., :16, :16]).shape
+
+
+def test_sides_are_multiples_of_the_stride() -> None:
+    assert (stride_of(1), stride_of(4)) == (16, 64)
+    check_trainable(128, CONFIG)
+    with pytest.raises(DatasetError, match="a multiple of 64 pixels; these have 96"):
+        check_trainable(96, CONFIG)
+
+
+@pytest.mark.parametrize(
+    ("option", "value"), [("patch", 0), ("stem", 0), ("metrics", -1), ("positive_weight", -0.5)]
+)
+def test_options_that_make_no_sense(option: str, value: float) -> None:
+    with pytest.raises(ConfigError, match=option):
+        CONFIG.updated({option: value})
