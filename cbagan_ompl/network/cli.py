@@ -210,6 +210,10 @@ def _train(args: argparse.Namespace) -> int:
 def _source(args: argparse.Namespace, config: TrainingConfig) -> AbstractContextManager[TaskSource]:
     """The tasks that the arguments of ``train`` ask for."""
     if args.worlds:
+        # Before the first worlds are drawn, which takes a while.
+        from .dataset import check_trainable
+
+        check_trainable(args.size, config)
         settings = WorldSettings(args.size, args.families, args.hard_share, args.world_seed)
         return world_source(settings, WorldSchedule(args.maps, args.held_back, args.jobs))
     dataset = load_dataset(args.dataset)
