@@ -32,7 +32,8 @@ CBAM = Attention()
 class ChannelAttention(nn.Module):
     """One weight in (0, 1) for each channel: eq. channel_attention_eqn of the paper.
 
-    Global average pool, 1x1 convolution, ReLU, 1x1 convolution, sigmoid.
+    Global average pool, 1x1 convolution, ReLU, 1x1 convolution, sigmoid. On a single place a 1x1
+    convolution is a linear layer, and faster as one.
 
     Args:
         channels: channels C of the features.
@@ -43,21 +44,22 @@ class ChannelAttention(nn.Module):
     def __init__(self, channels: int, reduction: int = 8) -> None:
         super().__init__()
         hidden = max(4, channels // reduction)
-        self.reduce = nn.Conv2d(channels, hidden, kernel_size=1)
-        self.expand = nn.Conv2d(hidden, channels, kernel_size=1)
+        self.reduce = nn.Linear(channels, hidden)
+        self.expand = nn.Linear(hidden, channels)
 
     def forward(self, features: Tensor) -> Tensor:
         """Weights of shape (B, C, 1, 1) for features of shape (B, C, H, W)."""
-        pooled = features.mean(dim=(2, 3), keepdim=True)
-        return torch.sigmoid(self.expand(torch.relu(self.reduce(pooled))))
+        pooled = features.mean(dim=(2, 3))
+        return torch.sigmoid(self.expand(torch.relu(self.reduce(pooled))))[:, :, None, None]
 
 
 class SpatialAttention(nn.Module):
     """One weight in (0, 1) for each pixel: eq. spatial_attention_eqn of the paper.
 
-    1x1 convolution, ReLU, 1x1 convolution, sigmoid. The paper does not say how many maps come
-    out; one map shared by all channels is what CBAM has, and keeps the roles of the two
-    attentions apart (which channel, which place).
+    1x1 convolution, ReLU, 1x1 convolution, sigmoid; a 1x1 convolution is a linear layer at every
+    place, and faster as one. The paper does not say how many maps come out; one map shared by all
+    channels is what CBAM has, and keeps the roles of the two attentions apart (which channel,
+    which place).
 
     Args:
         channels: channels C of the features.
@@ -67,12 +69,13 @@ class SpatialAttention(nn.Module):
     def __init__(self, channels: int, reduction: int = 8) -> None:
         super().__init__()
         hidden = max(4, channels // reduction)
-        self.reduce = nn.Conv2d(channels, hidden, kernel_size=1)
-        self.expand = nn.Conv2d(hidden, 1, kernel_size=1)
+        self.reduce = nn.Linear(channels, hidden)
+        self.expand = nn.Linear(hidden, 1)
 
     def forward(self, features: Tensor) -> Tensor:
         """Weights of shape (B, 1, H, W) for features of shape (B, C, H, W)."""
-        return torch.sigmoid(self.expand(torch.relu(self.reduce(features))))
+        places = features.permute(0, 2, 3, 1)
+        return torch.sigmoid(self.expand(torch.relu(self.reduce(places)))).permute(0, 3, 1, 2)
 
 
 class SelfAttention(nn.Module):

@@ -106,8 +106,8 @@ class Generator(nn.Module):
     Args:
         widths: channels after each of the four stages on the way down; the way up mirrors them.
         attention: see :class:`AttentionBlock`.
-        stem: channels of the map stem, of the point stem, and of the last stage; the noise stem
-            has twice as many.
+        stem: channels of the map stem, of the point stem, and of the last stage.
+        noise_stem: channels of the noise stem.
         patch: P.
         metrics: of the wavefronts; none of them with 0.
         white_obstacles: leave obstacles white in the image.
@@ -118,6 +118,7 @@ class Generator(nn.Module):
         widths: Sequence[int] = (32, 64, 96, 128),
         attention: Attention = CBAM,
         stem: int = 16,
+        noise_stem: int = 32,
         patch: int = 1,
         metrics: int = 0,
         white_obstacles: bool = False,
@@ -127,10 +128,10 @@ class Generator(nn.Module):
         self.white_obstacles = white_obstacles
         self.map_stem = _stem(3, stem, patch)
         self.point_stem = _stem(3, stem, patch)
-        self.noise_stem = _stem(1, 2 * stem, patch)
+        self.noise_stem = _stem(1, noise_stem, patch)
         fine = attention.without_self_attention()
         one, two, three, four = widths
-        self.down1 = ResidualBlock(4 * stem, one, 2, fine)
+        self.down1 = ResidualBlock(2 * stem + noise_stem, one, 2, fine)
         self.down2 = ResidualBlock(one, two, 2, attention)
         self.down3 = ResidualBlock(two, three, 2, attention)
         self.down4 = ResidualBlock(three, four, 2, attention)
@@ -194,8 +195,8 @@ def _places(point_image: Tensor, size: int) -> tuple[Tensor, Tensor]:
     Returns:
         Two tensors (B, 1, H / size, W / size), 1 where most of the spot is, 0 elsewhere.
     """
-    darkness = functional.avg_pool2d(1.0 - point_image, size)
-    start, goal = darkness[:, 0:1], darkness[:, 2:3]
-    start = (start >= start.amax((2, 3), keepdim=True)).float()
-    goal = (goal >= goal.amax((2, 3), keepdim=True)).float()
-    return start, goal
+    height, width = point_image.size(2) // size, point_image.size(3) // size
+    tiles = point_image[:, ::2].reshape(-1, 2, height, size, width * size).sum(3)
+    brightness = tiles.reshape(-1, 2, height, width, size).sum(4)
+    darkest = (brightness <= brightness.amin((2, 3), keepdim=True)).float()
+    return darkest[:, 0:1], darkest[:, 1:2]

@@ -134,6 +134,7 @@ def make_generator(config: TrainingConfig) -> Generator:
         config.widths,
         attention_of(config),
         config.stem,
+        config.noise_stem,
         config.patch,
         config.metrics,
         config.white_obstacles,
