@@ -15,7 +15,7 @@ from cbagan_ompl.network.dataset import check_trainable  # noqa: E402
 from cbagan_ompl.network.discriminators import Discriminator  # noqa: E402
 from cbagan_ompl.network.encoding import map_image, point_image  # noqa: E402
 from cbagan_ompl.network.export import RegionModel, save_script  # noqa: E402
-from cbagan_ompl.network.generator import Generator, stride_of  # noqa: E402
+from cbagan_ompl.network.generator import Generator, _places, stride_of  # noqa: E402
 from cbagan_ompl.network.networks import make_generator  # noqa: E402
 
 CONFIG = TrainingConfig(
@@ -110,6 +110,16 @@ def test_the_default_options_are_the_papers_generator() -> None:
     assert model.map_stem.kernel_size == (3, 3)
 
 
+def test_fronts_begin_where_most_of_a_spot_is() -> None:
+    starts, goals = torch.tensor([[13.0, 3.0], [8.0, 20.5]]), torch.tensor([[30.5, 25.2]] * 2)
+    start, goal = _places(point_image(starts, goals, 32, 40), 8)
+    assert start.shape == goal.shape == (2, 1, 4, 5)
+    assert start[0, 0].nonzero().tolist() == [[0, 1]]
+    # Half of it on either side of a border.
+    assert start[1, 0].nonzero().tolist() == [[2, 0], [2, 1]]
+    assert goal[:, 0].nonzero().tolist() == [[0, 3, 3], [1, 3, 3]]
+
+
 def test_discriminators_see_patches_as_places() -> None:
     inputs = torch.zeros(2, 3, 64, 64)
     logits = Discriminator(4, patch=4)(inputs, inputs)
@@ -124,7 +134,8 @@ def test_sides_are_multiples_of_the_stride() -> None:
 
 
 @pytest.mark.parametrize(
-    ("option", "value"), [("patch", 0), ("stem", 0), ("metrics", -1), ("positive_weight", -0.5)]
+    ("option", "value"),
+    [("patch", 0), ("stem", 0), ("noise_stem", 0), ("metrics", -1), ("positive_weight", -0.5)],
 )
 def test_options_that_make_no_sense(option: str, value: float) -> None:
     with pytest.raises(ConfigError, match=option):
