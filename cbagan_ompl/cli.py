@@ -11,7 +11,7 @@ from typing import Any
 from . import __version__
 from .benchmarking.cli import add_benchmark_parser
 from .datasets.cli import add_dataset_parser
-from .draws import DEFAULT_UNIFORM_FRACTION
+from .draw_options import add_draw_options
 from .errors import CbaganOmplError, ConfigError
 from .evaluation.cli import add_evaluate_parser
 from .files import check_folder, write_json
@@ -21,6 +21,7 @@ from .map_options import add_map_options, map_options
 from .mapfiles import bundled_maps
 from .network.cli import add_export_parser, add_train_parser
 from .tasks import tasks_of
+from .trust import Adaptation
 
 _PLAN_HELP = """\
 Plan a path on a map with one of OMPL's planners.
@@ -139,13 +140,7 @@ def _add_plan_parser(commands: Any) -> None:
     sampler.add_argument(
         "--heatmap", metavar="FILE", help="draw from this image or .npy instead of a model's"
     )
-    sampler.add_argument(
-        "--uniform-fraction",
-        type=float,
-        default=DEFAULT_UNIFORM_FRACTION,
-        metavar="F",
-        help=f"share of draws that stays uniform (default: {DEFAULT_UNIFORM_FRACTION})",
-    )
+    add_draw_options(sampler)
 
     output = parser.add_argument_group("output")
     output.add_argument("--output", metavar="FILE", help="picture of the plan (.png, .pdf, .svg)")
@@ -183,6 +178,7 @@ def _plan(args: argparse.Namespace) -> int:
         radius=args.radius,
         seed=args.seed,
         uniform_fraction=args.uniform_fraction,
+        adaptation=Adaptation.of(args.adaptation),
         model=args.model,
         heatmap=None if args.heatmap is None else Heatmap.load(args.heatmap, grid),
         simplify=args.simplify,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, nan
+from random import Random
 from typing import SupportsFloat
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from .errors import ConfigError, HeatmapError
 from .heatmap import Heatmap, draw_points
+from .trust import Trust
 
 #: Share of draws that stays uniform over free space unless the user asks otherwise.
 DEFAULT_UNIFORM_FRACTION = 0.1
@@ -23,6 +25,10 @@ _LOCAL_CANDIDATES = 32
 # Share of a batch inside the informed set under which the weights are made to follow the set: while
 # most draws fall inside, dropping the others is cheaper than weighing all pixels again.
 _MIN_ACCEPTED = 0.5
+
+# Draws of the heat map that may fall where the tree is already, before a uniform one takes their
+# place.
+_MAX_SPENT = 20
 
 # Batches without a single point inside the informed set before a draw from outside is let through.
 _MAX_EMPTY_BATCHES = 8
@@ -52,7 +58,7 @@ class DrawStream:
 
     Each draw comes from the heat map, or with probability ``uniform_fraction`` from the uniform
     distribution over free space, so that every free pixel keeps a positive probability and the
-    planner stays probabilistically complete.
+    planner stays probabilistically complete. With :meth:`adapt` that probability can be higher.
 
     Attributes:
         rng: the generator of the draws, and of whatever else belongs to the same run.
@@ -78,13 +84,14 @@ class DrawStream:
         self.learned = 0
         self.uniform = 0
         self.rng = np.random.default_rng(seed)
-        self._parts = tuple(_Part(part) for part in (heatmap, Heatmap.uniform(heatmap.grid)))
-        self._batch = _FIRST_BATCH
-        self._pending: list[tuple[float, float, float, bool]] = []
+        # A generator of single numbers, which NumPy's is slow at.
+        self._chance = Random(int(self.rng.integers(2**63))).random
+        self._hot = _Source(heatmap, self.rng)
+        self._even = _Source(Heatmap.uniform(heatmap.grid), self.rng)
         self._best_cost: Callable[[], float] = _no_cost
-        self._informed_set: Callable[[], InformedSet] = _no_set
-        self._informed: InformedSet | None = None
-        self._accepted = 1.0
+        self._informed_set: Callable[[], InformedSet | None] = _no_set
+        self._best = inf
+        self._trust: Trust | None = None
         self._box = np.full(2, -inf), np.full(2, inf)
 
     @property
@@ -105,37 +112,74 @@ class DrawStream:
         if np.array_equal(self._box, (low, high)):
             return
         self._box = low, high
-        self._pending.clear()
         map_low, map_high = self.heatmap.grid.bounds
         if (low > map_low).any() or (high < map_high).any():
-            self._parts = tuple(_Part(part.heatmap, self._box) for part in self._parts)
+            self._hot, self._even = (
+                _Source(source.heatmap, self.rng, self._box) for source in (self._hot, self._even)
+            )
 
     def follow(
-        self, best_cost: Callable[[], float], informed_set: Callable[[], InformedSet]
+        self, best_cost: Callable[[], float], informed_set: Callable[[], InformedSet | None]
     ) -> None:
         """Draw only where a path cheaper than the best known one can pass.
 
         Args:
             best_cost: called at every draw; the cost of the best known path, infinite before it.
-            informed_set: called once a solution is known; the set, by start and goal.
+            informed_set: called once a solution is known; the set, by start and goal, or None to
+                draw everywhere.
         """
         self._best_cost = best_cost
         self._informed_set = informed_set
 
+    def adapt(self, trust: Trust) -> None:
+        """Follow the heat map as far as it is trusted.
+
+        Args:
+            trust: asked at every draw of :meth:`next`.
+        """
+        self._trust = trust
+
     def next(self) -> tuple[float, float]:
         """The next draw, (x, y) in world coordinates."""
         best = self._best_cost()
-        if (best < inf) != (self._informed is not None):
-            self._inform(self._informed_set() if best < inf else None)
-        for _ in range(_MAX_EMPTY_BATCHES):
-            while self._pending:
-                x, y, bound, uniform = self._pending.pop()
-                if bound <= best:
-                    return self._count(x, y, uniform)
-            self._refill(best)
-        # Nothing of the map is in the informed set: any draw is as good as another.
-        x, y, _, uniform = self._pending.pop()
-        return self._count(x, y, uniform)
+        if best != self._best:
+            self._change_best(best)
+        share = 1 - self.uniform_fraction
+        if self._trust is not None:
+            share *= self._trust.share
+        point = self._next_learned(best) if self._chance() < share else None
+        if point is None:
+            self.uniform += 1
+            return self._even.next(best)
+        self.learned += 1
+        return point
+
+    def _next_learned(self, best: float) -> tuple[float, float] | None:
+        """A draw of the heat map; None where it is not to be had where the tree is not yet."""
+        trust = self._trust
+        if trust is None:
+            return self._hot.next(best)
+        trust.drawn()
+        if best < inf:
+            return self._hot.next(best)
+        for _ in range(_MAX_SPENT):
+            x, y = self._hot.next(best)
+            if not trust.is_spent(x, y):
+                return x, y
+        trust.blocked()
+        return None
+
+    def _change_best(self, best: float) -> None:
+        if (best < inf) != (self._best < inf):
+            informed = self._informed_set() if best < inf else None
+            self._hot.inform(informed)
+            self._even.inform(informed)
+        if self._trust is not None:
+            if best < self._best:
+                self._trust.improved()
+            else:
+                self._trust.restart()
+        self._best = best
 
     def near(self, x: float, y: float, distance: float) -> tuple[float, float]:
         """A draw within ``distance`` of (x, y) along each axis (OMPL's box neighbourhood)."""
@@ -148,65 +192,39 @@ class DrawStream:
         candidates = self.rng.normal((x, y), deviation, (_LOCAL_CANDIDATES, 2))
         return self._pick(np.clip(candidates, *self._box))
 
-    def _inform(self, informed: InformedSet | None) -> None:
-        self._informed = informed
-        self._accepted = 1.0
-        self._pending.clear()
-        for part in self._parts:
-            part.restrict(None, inf)
-
     def _pick(self, candidates: NDArray[np.float64]) -> tuple[float, float]:
         """Resample one of the candidates by its heat, or the first one as the uniform draw."""
         grid = self.heatmap.grid
         chosen, uniform = 0, True
-        if self.rng.random() >= self.uniform_fraction:
+        if self._chance() >= self.uniform_fraction:
             free = grid.is_free(candidates)
             columns, rows = grid.to_pixel(candidates[free]).astype(np.intp).T
             heat = np.zeros(len(candidates))
             heat[free] = self.heatmap.values[rows, columns]
             cumulative = heat.cumsum()
             if cumulative[-1] > 0:
-                threshold = self.rng.random() * cumulative[-1]
+                threshold = self._chance() * cumulative[-1]
                 chosen = int(np.searchsorted(cumulative, threshold, side="right"))
                 uniform = False
+        self.uniform += uniform
+        self.learned += not uniform
         x, y = candidates[chosen].tolist()
-        return self._count(x, y, uniform)
-
-    def _count(self, x: float, y: float, uniform: bool) -> tuple[float, float]:
-        if uniform:
-            self.uniform += 1
-        else:
-            self.learned += 1
         return x, y
 
-    def _refill(self, best: float) -> None:
-        size, self._batch = self._batch, min(2 * self._batch, _LARGEST_BATCH)
-        if self._informed is not None and self._accepted < _MIN_ACCEPTED:
-            for part in self._parts:
-                part.restrict(self._informed, best)
-        uniform = self.rng.random(size) < self.uniform_fraction
-        points = np.empty((size, 2))
-        for part, mask in zip(self._parts, (~uniform, uniform), strict=True):
-            points[mask] = part.draw(int(mask.sum()), self.rng)
-        bounds = np.full(size, -inf)
-        if self._informed is not None:
-            bounds = self._informed.shortest_through(points)
-            self._accepted = float((bounds <= best).mean())
-        bounds[~_inside(points, *self._box)] = nan  # no cost is above it: never handed out
-        columns = points[:, 0], points[:, 1], bounds, uniform
-        self._pending = list(zip(*(column.tolist() for column in columns), strict=True))
 
-
-class _Part:
-    """A heat map whose weights can be kept inside a box and made to follow the informed set."""
+class _Source:
+    """Endless draws of one heat map, kept inside a box and made to follow the informed set."""
 
     def __init__(
         self,
         heatmap: Heatmap,
+        rng: np.random.Generator,
         box: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
     ) -> None:
         self.heatmap = heatmap
         self._grid = heatmap.grid
+        self._rng = rng
+        self._box = box
         self._support = heatmap.support
         if box is not None:
             # Pixels that the box cuts keep their weight, the draws outside are dropped.
@@ -220,27 +238,57 @@ class _Part:
                     "space must be in the coordinates of the map"
                 )
         self._weights = heatmap.values.ravel()[self._support].astype(np.float64)
-        self._bounds: NDArray[np.float64] | None = None
-        self.restrict(None, inf)
+        self._batch = _FIRST_BATCH
+        self._pending: list[tuple[float, float, float]] = []
+        self.inform(None)
 
-    def restrict(self, informed: InformedSet | None, best: float) -> None:
+    def inform(self, informed: InformedSet | None) -> None:
+        """Draw only in the informed set from now on, or everywhere."""
+        self._informed = informed
+        self._accepted = 1.0
+        self._bounds: NDArray[np.float64] | None = None
+        self._pending.clear()
+        self._weigh(inf)
+
+    def next(self, best: float) -> tuple[float, float]:
+        """The next draw, (x, y) in world coordinates, where a path cheaper than ``best`` passes."""
+        for _ in range(_MAX_EMPTY_BATCHES):
+            while self._pending:
+                x, y, bound = self._pending.pop()
+                if bound <= best:
+                    return x, y
+            self._refill(best)
+        # Nothing of the map is in the informed set: any draw is as good as another.
+        x, y, _ = self._pending.pop()
+        return x, y
+
+    def _refill(self, best: float) -> None:
+        size, self._batch = self._batch, min(2 * self._batch, _LARGEST_BATCH)
+        if self._accepted < _MIN_ACCEPTED:
+            self._weigh(best)
+        points = draw_points(self._grid, self._active, self._cumulative, size, self._rng)
+        bounds = np.full(size, -inf)
+        if self._informed is not None:
+            bounds = self._informed.shortest_through(points)
+            self._accepted = float((bounds <= best).mean())
+        if self._box is not None:
+            bounds[~_inside(points, *self._box)] = nan  # no cost is above it: never handed out
+        columns = points[:, 0], points[:, 1], bounds
+        self._pending = list(zip(*(column.tolist() for column in columns), strict=True))
+
+    def _weigh(self, best: float) -> None:
         """Weigh only pixels with points in the informed set; where there are none, all of them."""
         self._active, weights = self._support, self._weights
-        if informed is None:
-            self._bounds = None
-        else:
+        if self._informed is not None:
             if self._bounds is None:
                 # The bound of no point of a pixel is lower than its centre's by more: it changes
                 # at most twice as fast as the distance from the centre, half a diagonal.
                 slack = np.sqrt(2) * self._grid.resolution
-                self._bounds = informed.shortest_through(self._centres()) - slack
+                self._bounds = self._informed.shortest_through(self._centres()) - slack
             inside = np.asarray(self._bounds <= best)
             if inside.any():
                 self._active, weights = self._support[inside], self._weights[inside]
         self._cumulative = weights.cumsum()
-
-    def draw(self, n: int, rng: np.random.Generator) -> NDArray[np.float64]:
-        return draw_points(self._grid, self._active, self._cumulative, n, rng)
 
     def _centres(self) -> NDArray[np.float64]:
         rows, columns = np.divmod(self._support, self._grid.width)
@@ -275,5 +323,5 @@ def _no_cost() -> float:
     return inf
 
 
-def _no_set() -> InformedSet:
-    raise AssertionError("asked for only after a finite best cost")
+def _no_set() -> None:
+    return None

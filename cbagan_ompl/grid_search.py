@@ -16,10 +16,7 @@ from .segments import segment_is_free
 _STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))
 _NO_PREDECESSOR = -9999
 
-# Longest side of a grid that is searched as a whole. A larger one is searched in a band around
-# the path through a coarse grid, this many coarse pixels to each side of it.
-_WHOLE_SIDE = 512
-_COARSE_SIDE = 256
+# Coarse pixels to each side of the coarse path that make the band to search in.
 _BAND = 3
 
 
@@ -28,12 +25,13 @@ def shortest_path(
     start: tuple[int, int],
     goal: tuple[int, int],
     cost: NDArray[np.float32] | None = None,
+    coarse_side: int = 256,
 ) -> NDArray[np.intp] | None:
     """Cheapest 8-connected path between two pixels.
 
-    A diagonal step needs both pixels beside it free, so that the path is a valid motion. Grids
-    with a side above 512 pixels are searched around the path through a coarse grid first, so that
-    their path may be a little dearer than the cheapest.
+    A diagonal step needs both pixels beside it free, so that the path is a valid motion. Large
+    grids are searched around the path through a coarse grid first, so that their path may be a
+    little dearer than the cheapest.
 
     Args:
         free: shape (H, W).
@@ -41,13 +39,14 @@ def shortest_path(
         goal: (column, row) of a free pixel.
         cost: price of a pixel length in each pixel, shape (H, W), positive; 1 by default. A step
             costs its length times the mean price of its two pixels.
+        coarse_side: longest side of the coarse grid; grids up to twice as long need none.
 
     Returns:
         Pixels (column, row), shape (K, 2), both ends included; None where nothing joins them.
     """
     price = np.ones(free.shape, np.float32) if cost is None else cost
-    if max(free.shape) > _WHOLE_SIDE:
-        band = _coarse_band(free, start, goal, price)
+    if max(free.shape) > 2 * coarse_side:
+        band = _coarse_band(free, start, goal, price, coarse_side)
         path = None if band is None else _search(free & band, start, goal, price)
         if path is not None:
             return path
@@ -59,9 +58,10 @@ def _coarse_band(
     start: tuple[int, int],
     goal: tuple[int, int],
     price: NDArray[np.float32],
+    coarse_side: int,
 ) -> NDArray[np.bool_] | None:
     """Pixels near the cheapest path through blocks of pixels, free where any of their pixels is."""
-    size = -(-max(free.shape) // _COARSE_SIDE)
+    size = -(-max(free.shape) // coarse_side)
     padding = [(0, -side % size) for side in free.shape]
     blocks = np.pad(free, padding)
     shape = blocks.shape[0] // size, size, blocks.shape[1] // size, size

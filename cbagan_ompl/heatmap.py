@@ -23,6 +23,9 @@ _CORRIDOR_SHARE = 0.03
 _BRIDGE_SHARE = 0.015
 _MIN_HALF_WIDTH = 2.0
 
+# Longest side of the coarse grid in which bridges are looked for.
+_REPAIR_SIDE = 64
+
 # Price of a pixel length inside the region, relative to one where the heat map is 0.
 _REGION_PRICE = 0.02
 
@@ -162,7 +165,7 @@ class Heatmap:
         if self.joins(start, goal):
             return self
         price = np.where(self.region, np.float32(_REGION_PRICE), 1 + _REGION_PRICE - self.values)
-        pixels = shortest_path(self.grid.free, *_pixel_pair(ends), price)
+        pixels = shortest_path(self.grid.free, *_pixel_pair(ends), price, _REPAIR_SIDE)
         assert pixels is not None, "check_task has made sure that a path exists"
         bridge = _band(
             self.grid.shape, pixels + np.float64(0.5), _half_width(self.grid, _BRIDGE_SHARE)

@@ -21,6 +21,7 @@ from cbagan_ompl import (
 )
 from cbagan_ompl.planning import compat, hooks
 from cbagan_ompl.planning.compat import ob, og, ou
+from cbagan_ompl.trust import NO_ADAPTATION
 
 # Planners that the README's table of hooks promises, by whether StateSamplers can be set.
 ALWAYS = {"RRT", "RRTstar", "InformedRRTstar", "SORRTstar", "PRM", "PRMstar", "BKPIECE1"}
@@ -80,9 +81,10 @@ def test_table_of_hooks() -> None:
     reached = reached_planners()
     assert set(reached) >= ALWAYS
     assert reached["PRM"] == reached["BKPIECE1"] == "valid-state-sampler"
-    tree_hook = "state-sampler" if compat.HAS_STATE_SAMPLER_ALLOCATOR else "goal-injection"
-    assert {reached[name] for name in ("RRT", "RRTstar", "InformedRRTstar")} == {tree_hook}
-    assert ("RRTConnect" in reached) == compat.HAS_STATE_SAMPLER_ALLOCATOR
+    trees = ("RRT", "RRTstar", "InformedRRTstar", "SORRTstar")
+    assert {reached[name] for name in trees} == {"goal-injection"}
+    by_state_sampler = reached.get("RRTConnect") == "state-sampler"
+    assert by_state_sampler == compat.HAS_STATE_SAMPLER_ALLOCATOR
 
 
 @pytest.mark.parametrize("planner", sorted(reached_planners()))
@@ -106,7 +108,7 @@ def test_planner_draws_from_the_heatmap(
 def test_nearly_all_samples_are_ours(two_walls: GridMap, corridor: Heatmap, planner: str) -> None:
     compat.seed_ompl(2)
     setup = make_setup(two_walls, planner)
-    with attach(setup, corridor, uniform_fraction=0.1, seed=2) as link:
+    with attach(setup, corridor, 0.1, seed=2, adaptation=NO_ADAPTATION) as link:
         condition, iterations = until(lambda: False, limit=1500)
         setup.solve(condition)
         share = sum(link.draws.values()) / iterations[0]
@@ -248,7 +250,7 @@ def test_unreached_planners_say_what_would_reach_them(
 
 def test_a_build_that_binds_the_allocator_uses_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hooks, "HAS_STATE_SAMPLER_ALLOCATOR", True)
-    assert hooks.hook_of("RRTstar") == hooks.hook_of("RRTConnect") == "state-sampler"
+    assert hooks.hook_of("RRTsharp") == hooks.hook_of("RRTConnect") == "state-sampler"
 
 
 def test_attach_needs_planner_and_task(two_walls: GridMap, corridor: Heatmap) -> None:

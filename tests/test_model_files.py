@@ -345,7 +345,8 @@ def test_bad_tasks_are_refused(predictor: Predictor) -> None:
 
 def test_scaled_shape_keeps_the_aspect() -> None:
     assert scaled_shape((256, 128), 64) == (64, 32)
-    assert scaled_shape((30, 40), 64) == (30, 40)
+    assert scaled_shape((30, 40), 64) == (48, 64)
+    assert scaled_shape((64, 20), 64) == (64, 20)
     assert scaled_shape((1000, 3), 64) == (64, 1)
 
 
@@ -354,3 +355,9 @@ def test_scaling_keeps_narrow_passages() -> None:
     free[:, 3] = True
     assert scaled_free(free, (4, 3)).tolist() == [[False, True, False]] * 4
     assert np.array_equal(scaled_free(free, free.shape), free)
+
+
+def test_small_maps_are_enlarged() -> None:
+    free = np.array([[True, False], [False, True]])
+    enlarged = scaled_free(free, (4, 6))
+    assert np.array_equal(enlarged, free.repeat(2, axis=0).repeat(3, axis=1))

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..checks import check_at_least
-from ..draws import DEFAULT_UNIFORM_FRACTION
+from ..draw_options import add_draw_options
 from ..errors import ConfigError
 from ..map_options import add_map_options, map_options
 from ..mapfiles import bundled_maps
@@ -99,13 +99,7 @@ def add_benchmark_parser(commands: Any) -> None:
         help="exported model of the learned sampler (default: the bundled one); with a name, a "
         "further sampler NAME that draws from this model; may be repeated",
     )
-    contest.add_argument(
-        "--uniform-fraction",
-        type=float,
-        default=DEFAULT_UNIFORM_FRACTION,
-        metavar="F",
-        help=f"share of draws that stays uniform (default: {DEFAULT_UNIFORM_FRACTION})",
-    )
+    add_draw_options(contest)
     contest.add_argument(
         "--range",
         type=float,
@@ -198,6 +192,7 @@ def _benchmark(args: argparse.Namespace) -> int:
         range=args.range,
         parameters=parse_parameters(args.set),
         uniform_fraction=args.uniform_fraction,
+        adaptation=args.adaptation,
         models=models,
         heatmap_dirs=folders,
         radius=args.radius,

@@ -14,6 +14,7 @@ import yaml
 from ..checks import check_at_least
 from ..draws import DEFAULT_UNIFORM_FRACTION
 from ..errors import ConfigError
+from ..trust import ADAPTATION_PARTS, Adaptation
 
 #: OMPL's own sampler, which the others are compared with.
 BASELINE = "uniform"
@@ -36,6 +37,8 @@ class Settings:
             OMPL's choice (a fifth of the map's diagonal).
         parameters: for some planners ``{parameter: value}``.
         uniform_fraction: share of draws that stays uniform over free space, in (0, 1].
+        adaptation: names of the parts of the adaptation that are on, see
+            :mod:`cbagan_ompl.trust`.
         models: for some samplers the file of the model that they draw from; the bundled one for
             ``learned`` by default.
         heatmap_dirs: for some samplers the folder of their heat maps, one for each task.
@@ -53,6 +56,7 @@ class Settings:
     range: float | None = None
     parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     uniform_fraction: float = DEFAULT_UNIFORM_FRACTION
+    adaptation: tuple[str, ...] = ADAPTATION_PARTS
     models: Mapping[str, str] = field(default_factory=dict)
     heatmap_dirs: Mapping[str, str] = field(default_factory=dict)
     radius: float = 0.0
@@ -70,6 +74,7 @@ class Settings:
             raise ConfigError(
                 f"uniform_fraction is a share above 0 and up to 1, got {self.uniform_fraction}"
             )
+        Adaptation.of(self.adaptation)
         check_at_least("seed", self.seed, 0)
         for planner in self.parameters:
             if planner not in self.planners:

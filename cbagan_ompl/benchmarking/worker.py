@@ -11,6 +11,7 @@ from ..errors import ConfigError
 from ..heatmap import Heatmap
 from ..planning.benchmark import Entrant, RunOptions, check_entrants, run_benchmark
 from ..planning.plan import SAMPLERS, Provider, heatmap_provider
+from ..trust import Adaptation
 from .logs import ExperimentLog, format_log, join_logs, parse_log
 from .measures import FAMILY, MAP, add_measures
 from .selection import BenchmarkTask, heatmap_file
@@ -85,6 +86,7 @@ def _options(job: Job) -> RunOptions:
         range=settings.range,
         tolerance=job.task.grid.resolution,
         uniform_fraction=settings.uniform_fraction,
+        adaptation=Adaptation.of(settings.adaptation),
         seed=(settings.seed + crc32(job.task.name.encode())) % 2**32,
     )
 

@@ -74,8 +74,8 @@ class Predictor:
         """Predict where good paths run.
 
         Args:
-            grid: the map, of any size. A map longer than the model's ``working_size`` is scaled
-                down for the network, and the result up again.
+            grid: the map, of any size. For the network its longer side is scaled to the model's
+                ``working_size``, and the result back again.
             start: (x, y), world.
             goal: (x, y), world.
             repair: join the parts of the region where it falls apart between start and goal, see
@@ -129,13 +129,13 @@ class Predictor:
 
 
 def scaled_shape(shape: tuple[int, int], longest: int) -> tuple[int, int]:
-    """Rows and columns of a map whose longer side is scaled down to ``longest`` pixels at most."""
-    factor = min(1.0, longest / max(shape))
+    """Rows and columns of a map whose longer side is scaled to ``longest`` pixels."""
+    factor = longest / max(shape)
     return max(1, round(factor * shape[0])), max(1, round(factor * shape[1]))
 
 
 def scaled_free(free: NDArray[np.bool_], shape: tuple[int, int]) -> NDArray[np.bool_]:
-    """A free mask scaled down so that a pixel stays free when any pixel of its block is.
+    """A free mask enlarged, or scaled down so that a pixel is free when any of its block is.
 
     Narrow passages survive, thin walls may not. That is the lesser harm: what the network then
     draws across a wall is cut out by the obstacles of the full map, whereas a passage that it
@@ -143,7 +143,7 @@ def scaled_free(free: NDArray[np.bool_], shape: tuple[int, int]) -> NDArray[np.b
 
     Args:
         free: (H, W).
-        shape: (h, w), at most (H, W).
+        shape: (h, w).
     """
     rows, columns = (np.arange(n) * size // n for n, size in zip(shape, free.shape, strict=True))
     return np.logical_or.reduceat(np.logical_or.reduceat(free, rows, axis=0), columns, axis=1)

@@ -12,6 +12,7 @@ import numpy as np
 from ..draws import DEFAULT_UNIFORM_FRACTION, DrawStream
 from ..errors import PlannerError
 from ..heatmap import Heatmap
+from ..trust import FULL_ADAPTATION, Adaptation, Trust
 from . import compat, samplers
 from .compat import ob, ou
 from .goal_injection import InjectedGoal
@@ -24,6 +25,11 @@ from .hooks import (
 )
 from .positions import Positions, bounds_of, positions_of
 from .progress import PlannerProgress, is_followed
+
+# OMPL's range of a planner that was given none, as a share of the extent of the space.
+_OMPL_RANGE = 0.2
+# How far around a node its tree is taken to be, as a share of the range.
+_REACH = 0.8
 
 
 class Attachment:
@@ -70,6 +76,7 @@ def attach(
     heatmap: Heatmap,
     uniform_fraction: float = DEFAULT_UNIFORM_FRACTION,
     seed: int | np.random.Generator | None = None,
+    adaptation: Adaptation = FULL_ADAPTATION,
 ) -> Attachment:
     """Make the planner of a SimpleSetup draw from a heat map.
 
@@ -85,6 +92,8 @@ def attach(
         heatmap: where to draw, in the coordinates of the setup's space.
         uniform_fraction: share of draws that stays uniform over free space, in (0, 1].
         seed: seed or generator of the draws; seed OMPL as well for repeatable plans.
+        adaptation: how the share of the heat map changes while the planner plans, see
+            :mod:`cbagan_ompl.trust`; for planners that goal injection reaches.
 
     Returns:
         A handle with ``.hook``, ``.draws`` and ``.detach()``.
@@ -108,9 +117,11 @@ def attach(
     planner.clear()
     setup.getProblemDefinition().clearSolutionPaths()
     progress = PlannerProgress(setup, positions)
-    if _is_informed(planner):
-        stream.follow(progress.path_length, progress.informed_set)
-    undo_hook = _INSTALL[hook](_Parts(setup, planner, name, positions, stream, progress))
+    stream.follow(
+        progress.best_cost, progress.informed_set if _is_informed(planner) else progress.no_set
+    )
+    parts = _Parts(setup, planner, name, positions, stream, progress, adaptation)
+    undo_hook = _INSTALL[hook](parts)
 
     def undo() -> None:
         progress.release()
@@ -159,6 +170,7 @@ class _Parts:
     positions: Positions
     stream: DrawStream
     progress: PlannerProgress
+    adaptation: Adaptation
 
 
 def _use_state_sampler(parts: _Parts) -> Callable[[], None]:
@@ -213,7 +225,9 @@ def _inject_goals(parts: _Parts) -> Callable[[], None]:
     setup, planner = parts.setup, parts.planner
     original, bias = setup.getGoal(), planner.getGoalBias()
     si = setup.getSpaceInformation()
-    injected = InjectedGoal(si, original, parts.positions, parts.stream, parts.progress)
+    trust = Trust(parts.stream.heatmap, parts.adaptation, _reach(planner, si), parts.progress.nodes)
+    parts.stream.adapt(trust)
+    injected = InjectedGoal(si, original, parts.positions, parts.stream, parts.progress, trust)
     setup.setGoal(injected)
     planner.setGoalBias(1.0)
 
@@ -223,6 +237,13 @@ def _inject_goals(parts: _Parts) -> Callable[[], None]:
         planner.setGoalBias(bias)
 
     return undo
+
+
+def _reach(planner: Any, si: Any) -> float:
+    """How far around a node a tree need not grow again, world units: most of its longest edge."""
+    # Before its setup a planner may have no range yet; OMPL then takes a share of the space.
+    longest = planner.getRange() or _OMPL_RANGE * si.getMaximumExtent()
+    return _REACH * float(longest)
 
 
 _INSTALL = {

@@ -15,6 +15,7 @@ import numpy as np
 from ..draws import DEFAULT_UNIFORM_FRACTION
 from ..gridmap import GridMap
 from ..heatmap import Heatmap
+from ..trust import FULL_ADAPTATION, Adaptation
 from . import compat
 from .attach import Attachment, attach
 from .compat import ou
@@ -101,6 +102,7 @@ class RunOptions:
             for None.
         tolerance: how far from the goal a path may end, world units.
         uniform_fraction: share of draws that stays uniform over free space, in (0, 1].
+        adaptation: how the share of a heat map changes meanwhile, see :mod:`cbagan_ompl.trust`.
         seed: at least 0; of OMPL's generators and of the draws.
     """
 
@@ -109,6 +111,7 @@ class RunOptions:
     range: float | None = None
     tolerance: float = 0.0
     uniform_fraction: float = DEFAULT_UNIFORM_FRACTION
+    adaptation: Adaptation = FULL_ADAPTATION
     seed: int = 0
 
 
@@ -240,7 +243,13 @@ class _Contest:
             heatmap, made_in = self._heatmaps[self._sampler_of[name]]
             self.setup.setPlanner(instance)
             began = perf_counter()
-            self._link = attach(self.setup, heatmap, self._options.uniform_fraction, self._rng)
+            self._link = attach(
+                self.setup,
+                heatmap,
+                self._options.uniform_fraction,
+                self._rng,
+                self._options.adaptation,
+            )
             self._inference_s = made_in + perf_counter() - began
         self._motions.begin_run(instance)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..draws import DrawStream
+from ..trust import Trust
 from .compat import ob
 from .positions import Positions
 from .progress import PlannerProgress
@@ -29,6 +30,7 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
         positions: access to the positions of the states.
         stream: the draws.
         progress: what is known of the planner.
+        trust: told of every node of the tree.
     """
 
     def __init__(
@@ -38,6 +40,7 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
         positions: Positions,
         stream: DrawStream,
         progress: PlannerProgress,
+        trust: Trust,
     ) -> None:
         super().__init__(si)
         self.setThreshold(original.getThreshold())
@@ -45,10 +48,14 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
         self._positions = positions
         self._stream = stream
         self._progress = progress
+        self._trust = trust
+        self._began = False
 
     def distanceGoal(self, state: Any) -> float:  # noqa: N802
-        """Distance to the original goal."""
-        return float(self._original.distanceGoal(state))
+        """Distance to the original goal, which planners ask for every new node of their tree."""
+        distance = float(self._original.distanceGoal(state))
+        self._trust.grown(*self._positions.read(state), arrived=distance < self.getThreshold())
+        return distance
 
     def maxSampleCount(self) -> int:  # noqa: N802
         """No end of samples for the planner, the original's number for anybody else."""
@@ -63,6 +70,9 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
         progress = self._progress
         sampling = progress.is_sampling
         progress.note_sample()
+        if sampling and not self._began:
+            self._began = True
+            self._trust.begin(progress.joins(self._stream.heatmap))
         if not sampling or (not progress.has_solution and self._stream.rng.random() < _GOAL_BIAS):
             self._original.sampleGoal(state)
         else:

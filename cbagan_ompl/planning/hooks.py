@@ -48,7 +48,8 @@ _DRAW_VALID_STATES = frozenset(
     }
 )
 
-# Planners that grow their tree towards samples of the goal with a settable probability.
+# Planners that grow their tree towards samples of the goal with a settable probability. They ask
+# the goal about every node of their tree as well, so that draws can follow what the tree does.
 _SAMPLE_GOAL = frozenset({"InformedRRTstar", "RRT", "RRTstar", "SORRTstar"})
 
 
@@ -63,10 +64,10 @@ def hook_of(planner: str) -> str:
     """
     if planner in _DRAW_VALID_STATES:
         return VALID_STATE_SAMPLER
-    if planner in _DRAW_STATES and HAS_STATE_SAMPLER_ALLOCATOR:
-        return STATE_SAMPLER
     if planner in _SAMPLE_GOAL:
         return GOAL_INJECTION
+    if planner in _DRAW_STATES and HAS_STATE_SAMPLER_ALLOCATOR:
+        return STATE_SAMPLER
     if planner in _DRAW_STATES:
         raise PlannerError(
             f"{planner} draws from a StateSampler, which OMPL {ompl_version()} does not let "

@@ -18,6 +18,7 @@ from ..draws import DEFAULT_UNIFORM_FRACTION, check_uniform_fraction
 from ..errors import ConfigError
 from ..gridmap import GridMap
 from ..heatmap import Heatmap
+from ..trust import FULL_ADAPTATION, Adaptation
 from . import compat
 from .attach import attach
 from .compat import ou
@@ -146,6 +147,7 @@ def plan(
     *,
     goal_tolerance: float | None = None,
     keep_tree: bool = False,
+    adaptation: Adaptation = FULL_ADAPTATION,
 ) -> PlanResult:
     """Plan a path on a map with one of OMPL's planners, unmodified.
 
@@ -173,6 +175,8 @@ def plan(
         goal_tolerance: how far from the goal a path may end, world units; by default a pixel. At 0
             paths end in the goal itself.
         keep_tree: put the edges of the planner's tree into the result.
+        adaptation: how the share of the heat map changes while the planner plans, see
+            :mod:`cbagan_ompl.trust`.
 
     Returns:
         The result; not finding a path in time is no error, ``solved`` is False then.
@@ -212,7 +216,7 @@ def plan(
         drawn_from = provide(space_map, *task) if provide is not None else None
         link = None
         if drawn_from is not None:
-            link = attach(setup, drawn_from, uniform_fraction, used_seed)
+            link = attach(setup, drawn_from, uniform_fraction, used_seed, adaptation)
         inference_s = perf_counter() - began if link else 0.0
         try:
             run = _solve(setup, planner, time_limit, count_limit)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..draws import InformedSet
+from ..heatmap import Heatmap
 from .compat import best_cost, new_state, ob, planner_data, start_states, typed_state
 from .positions import Positions
 
@@ -64,22 +65,30 @@ class PlannerProgress:
     @property
     def has_solution(self) -> bool:
         """Whether a planner that goes on after its first solution has found it."""
-        return self._counts_iterations and self.best_cost() < inf
+        return self.best_cost() < inf
 
     def best_cost(self) -> float:
-        """Cost of the best solution, infinite before there is one."""
-        return inf if self._planner is None else best_cost(self._planner)
+        """Cost of the best solution, infinite before there is one.
 
-    def path_length(self) -> float:
-        """The best cost where it is a path length, otherwise infinite."""
-        if self._problem is None or not isinstance(
-            self._problem.getOptimizationObjective(), ob.PathLengthOptimizationObjective
-        ):
+        Always infinite for planners that do not tell it; they stop at their first solution.
+        """
+        if self._planner is None or not self._counts_iterations:
             return inf
-        return self.best_cost()
+        return best_cost(self._planner)
 
-    def informed_set(self) -> InformedSet:
-        """The informed set of the task, once the planner has begun to plan."""
+    def no_set(self) -> None:
+        """The informed set of a planner that looks for shorter paths everywhere: there is none."""
+
+    def informed_set(self) -> InformedSet | None:
+        """The informed set of the task, once the planner has begun to plan.
+
+        None where costs are no path lengths.
+        """
+        objective = self._problem.getOptimizationObjective()
+        is_length = isinstance(objective, ob.PathLengthOptimizationObjective)
+        return self._ends() if is_length else None
+
+    def _ends(self) -> InformedSet:
         state = new_state(self._planner.getSpaceInformation().getStateSpace())
         typed = typed_state(state)
         goals = []
@@ -88,6 +97,15 @@ class PlannerProgress:
             goals.append(self._positions.read(typed))
         starts = [self._positions.read(start) for start in start_states(self._planner)]
         return InformedSet(np.array(starts), np.array(goals), self._goal.getThreshold())
+
+    def joins(self, heatmap: Heatmap) -> bool:
+        """Whether a region joins a start with a goal, once the planner has begun to plan."""
+        ends = self._ends()
+        return any(heatmap.joins(start, goal) for start in ends.starts for goal in ends.goals)
+
+    def nodes(self) -> int:
+        """Number of nodes of the tree."""
+        return 0 if self._planner is None else int(planner_data(self._planner).numVertices())
 
     def refers_to(self, planner: Any) -> bool:
         """Whether this is the progress of a planner."""
