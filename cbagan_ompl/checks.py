@@ -17,6 +17,16 @@ def check_at_least(name: str, value: int, least: int) -> None:
         raise ConfigError(f"{name} must be at least {least}, got {value}")
 
 
+def check_share(name: str, value: float) -> None:
+    """Refuse a number that is no share of anything.
+
+    Raises:
+        ConfigError: it is below 0, above 1 or NaN; the message has the name of the option.
+    """
+    if not 0 <= value <= 1:
+        raise ConfigError(f"{name} is a share from 0 to 1, got {value}")
+
+
 def require(package: str, extra: str) -> None:
     """Check that an optional package is installed.
 

@@ -15,7 +15,9 @@ from dataclasses import replace
 from multiprocessing import active_children
 from multiprocessing.context import ForkServerProcess
 from pathlib import Path
+from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from interrupting import interrupted
@@ -32,6 +34,7 @@ from cbagan_ompl.datasets.generation import (
     draw_map,
     generate,
 )
+from cbagan_ompl.datasets.geodesic import distances
 from cbagan_ompl.datasets.importing import described, read_set, write_dataset
 from cbagan_ompl.datasets.layout import Dataset, load_dataset
 from cbagan_ompl.datasets.noise import label_noise
@@ -443,3 +446,34 @@ def test_an_interrupt_while_processes_start_leaves_none(monkeypatch: pytest.Monk
         run_all(time.sleep, [(3600,), (3600,)], 2, "maps", progress=False)
     assert started
     assert not active_children()
+
+
+def test_exact_labels_of_varied_maps(tmp_path: Path) -> None:
+    settings = GenerationSettings(
+        maps=2, tasks=6, size=64, families=("cell_maze",), varied=True, label="geodesic",
+        hard_share=1.0, seed=3,
+    )  # fmt: skip
+    generate(tmp_path / "one", settings, jobs=1, resume=False, progress=False)
+    generate(tmp_path / "two", settings, jobs=2, resume=False, progress=False)
+    one, two = load_dataset(tmp_path / "one"), load_dataset(tmp_path / "two")
+    for tasks, again in ((one.train, two.train), (one.test, two.test)):
+        assert np.array_equal(tasks.region, again.region)
+        assert np.array_equal(tasks.start, again.start)
+        for i in range(len(tasks)):
+            free = tasks.free[i]
+            (u, v), (x, y) = tasks.start[i].astype(int), tasks.goal[i].astype(int)
+            parts = cv2.connectedComponents(
+                (tasks.region[i] > 0).astype(np.uint8) & free, connectivity=4
+            )[1]
+            assert parts[v, u] == parts[y, x] > 0
+            way = distances(free, (int(u), int(v)))[y, x]
+            assert way >= 1.25 * np.hypot(u - x, v - y)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [({"label": "guess"}, "rrt, geodesic"), ({"hard_share": 1.5}, "hard_share is a share")],
+)
+def test_options_of_exact_labels(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(ConfigError, match=message):
+        GenerationSettings(**options)

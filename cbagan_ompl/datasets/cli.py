@@ -11,9 +11,10 @@ from ..checks import check_at_least
 from ..errors import ConfigError
 from ..files import write_json
 from ..map_families import FAMILIES
-from .generation import RANGE, RUNS, GenerationSettings, generate
+from .generation import LABELS, RANGE, RUNS, GenerationSettings, generate
 from .importing import KEEP, described, read_set, write_dataset
 from .splits import SPLITS
+from .worlds import HARD_DETOUR
 
 _HELP = """\
 Training sets: check and split one that is there, make a new one, measure how noisy labels are.
@@ -33,7 +34,7 @@ puts each original map with its ten copies on one side.
 """
 
 _GENERATE_HELP = """\
-Make a training set: random maps, tasks on them, and as labels the union of many runs of RRT.
+Make a training set: random maps, tasks on them, and labels, by many runs of RRT or exact ones.
 
   cbagan-ompl dataset generate --output mine --maps 100 --tasks 100 --copies 10
   cbagan-ompl train mine --output runs/mine
@@ -99,6 +100,18 @@ def _add_generate(actions: Any) -> None:
         default=defaults.families,
         metavar="A,B",
         help=f"kinds of maps, taken in turn (default: all: {','.join(FAMILIES)})",
+    )
+    parser.add_argument(
+        "--varied", action="store_true", help="scale, turn and wear the maps at random"
+    )
+    hard = f"share of tasks whose way is {HARD_DETOUR} times as long as the straight line, or more"
+    _add_number(parser, "--hard-share", defaults.hard_share, hard)
+    parser.add_argument(
+        "--label",
+        choices=LABELS,
+        default=defaults.label,
+        help="rrt: where many runs of RRT pass; geodesic: where paths pass that are not much "
+        f"longer than the shortest (default: {defaults.label})",
     )
     distance = "from start to goal, as a share of the side"
     _add_number(parser, "--min-distance", defaults.min_distance, distance)
@@ -189,7 +202,10 @@ def _generate(args: argparse.Namespace) -> int:
         tasks=args.tasks,
         size=args.size,
         families=args.families,
+        varied=args.varied,
         copies=args.copies,
+        label=args.label,
+        hard_share=args.hard_share,
         runs=args.runs,
         range=args.range,
         min_distance=args.min_distance,

@@ -1,4 +1,4 @@
-"""New training sets: random maps, tasks on them, and the labels of RRT.
+"""New training sets: random maps, tasks on them, and labels of RRT or exact ones.
 
 What a map, its tasks and their labels are depends on the seed and the number of the map alone, so
 that a set is the same whatever the number of processes and however often it was interrupted (with
@@ -15,19 +15,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import check_at_least
+from ..checks import check_at_least, check_share, require
 from ..errors import ConfigError, DatasetError
 from ..files import write_json
 from ..gridmap import GridMap
-from ..map_families import FAMILIES, MIN_SIDE
+from ..heatmap import REGION_BORDER
+from ..map_families import FAMILIES, MIN_SIDE, check_families
+from ..map_families.variation import world_map
 from .augmentation import augmented
 from .layout import Tasks
 from .pool import run_all
 from .splits import is_test_task
+from .worlds import HARD_DETOUR, detour_heat
 from .writing import Row, task_row, write_lists, write_map, write_tasks
 
 RECORD = "dataset.json"
 
+#: Kinds of labels.
+LABELS = ("rrt", "geodesic")
 #: The paper's number of runs of RRT for a label.
 RUNS = 50
 #: Limit of each run, in iterations: the paper's.
@@ -36,7 +41,7 @@ ITERATIONS = 5000
 #: 12/64) the short ones give labels like the published ones; half of it is twice as slow.
 RANGE = 1 / 64
 
-_MAX_TRIES = 1000
+_MAX_TRIES, _MAX_HARD_TRIES = 1000, 100
 
 
 @dataclass(frozen=True)
@@ -48,8 +53,14 @@ class GenerationSettings:
         tasks: on each map.
         size: side of the maps in pixels.
         families: names from :data:`cbagan_ompl.map_families.FAMILIES`, taken in turn.
+        varied: scale, turn and wear each original, see :mod:`cbagan_ompl.map_families.variation`.
         copies: maps from each original; the first is the original itself, the others are
             augmented (10 in the paper).
+        label: ``rrt``, the union of the paths of many runs, as in the paper; or ``geodesic``, the
+            region of :func:`cbagan_ompl.datasets.worlds.detour_heat`.
+        hard_share: share of tasks whose shortest way is at least
+            :data:`cbagan_ompl.datasets.worlds.HARD_DETOUR` times as long as the straight line,
+            where a map has such tasks; the others are as they come.
         runs: of RRT for each label.
         range: longest edge of RRT in pixels; None for ``size`` / 64.
         min_distance: least distance from start to goal as a share of the side.
@@ -65,7 +76,10 @@ class GenerationSettings:
     tasks: int = 100
     size: int = 64
     families: tuple[str, ...] = tuple(FAMILIES)
+    varied: bool = False
     copies: int = 1
+    label: str = LABELS[0]
+    hard_share: float = 0.0
     runs: int = RUNS
     range: float | None = None
     min_distance: float = 0.25
@@ -78,11 +92,10 @@ class GenerationSettings:
             check_at_least(name, getattr(self, name), 1)
         if self.size < MIN_SIDE:
             raise ConfigError(f"size must be at least {MIN_SIDE} pixels, got {self.size}")
-        unknown = [name for name in self.families if name not in FAMILIES]
-        if unknown or not self.families:
-            raise ConfigError(
-                f"unknown map family {', '.join(unknown)!r}; there are {', '.join(FAMILIES)}"
-            )
+        check_families(self.families)
+        if self.label not in LABELS:
+            raise ConfigError(f"a label is one of {', '.join(LABELS)}, got {self.label!r}")
+        check_share("hard_share", self.hard_share)
         if self.range is not None and not 0 < self.range < float("inf"):
             raise ConfigError(f"range must be above 0, got {self.range}")
         if not 0 <= self.min_distance < 1:
@@ -96,6 +109,11 @@ class GenerationSettings:
     def originals(self) -> NDArray[np.int64]:
         """For each task the number of its original map, shape (maps * tasks,)."""
         return (np.arange(self.maps) // self.copies).repeat(self.tasks)
+
+    @property
+    def needs_distances(self) -> bool:
+        """Whether tasks or labels are made from shortest ways."""
+        return self.label == "geodesic" or self.hard_share > 0
 
     @property
     def longest_edge(self) -> float:
@@ -117,8 +135,11 @@ def generate(
 
     Raises:
         ConfigError: ``resume`` with other settings, or without it although the folder holds a set.
+        MissingDependencyError: shortest ways are needed, and numba is not installed.
         DatasetError: a file cannot be written, or a map has no task of the wanted distance.
     """
+    if settings.needs_distances:
+        require("numba", "train")
     _prepare(folder, settings, resume)
     missing = [k for k in range(settings.maps) if not _task_list(folder, k).is_file()]
     run_all(_make_map, [(folder, settings, k) for k in missing], jobs, "maps", progress)
@@ -185,9 +206,12 @@ def draw_map(settings: GenerationSettings, number: int) -> NDArray[np.bool_]:
         number: of the map, from 0.
     """
     original, copy = divmod(number, settings.copies)
-    family = FAMILIES[settings.families[original % len(settings.families)]]
+    family = settings.families[original % len(settings.families)]
     rng = np.random.default_rng((settings.seed, original))
-    free = family(rng, settings.size, settings.size)
+    if settings.varied:
+        free = world_map(rng, settings.size, [family])
+    else:
+        free = FAMILIES[family](rng, settings.size, settings.size)
     return augmented(free, np.random.default_rng((settings.seed, original, copy))) if copy else free
 
 
@@ -195,20 +219,50 @@ def _draw_task(
     grid: GridMap, settings: GenerationSettings, rng: np.random.Generator
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Start and goal, (2, 2), and their region; drawn again until RRT finds a path."""
-    from ..planning.labels import rrt_region
-
     rows, columns = np.nonzero(grid.free)
     points = (np.stack((columns, rows), axis=-1) + 0.5).astype(np.float64)
-    for _ in range(_MAX_TRIES):
+    hard = settings.hard_share > 0 and rng.random() < settings.hard_share
+    for attempt in range(_MAX_TRIES):
         ends = points[rng.integers(len(points), size=2)]
         seed = int(rng.integers(2**32))
         if np.hypot(*(ends[1] - ends[0])) < max(settings.min_distance * settings.size, 1):
             continue
-        task = grid.check_task(*ends)
-        region = rrt_region(grid, task, settings.runs, settings.longest_edge, ITERATIONS, seed)
+        # Some maps have no hard tasks.
+        if hard and attempt < _MAX_HARD_TRIES and not _is_hard(grid, ends):
+            continue
+        region = _label(grid, ends, settings, seed)
         if region.any():
             return ends, region
     raise DatasetError(
         f"found no task of at least {settings.min_distance:g} of the side on a map; "
         "ask for a smaller distance"
     )
+
+
+def _is_hard(grid: GridMap, ends: NDArray[np.float64]) -> bool:
+    from .geodesic import distances
+
+    start, goal = _pixels(ends)
+    shortest = distances(grid.free, start)[goal[1], goal[0]]
+    return bool(shortest >= HARD_DETOUR * np.hypot(*(ends[1] - ends[0])))
+
+
+def _label(
+    grid: GridMap, ends: NDArray[np.float64], settings: GenerationSettings, seed: int
+) -> NDArray[np.bool_]:
+    if settings.label == "geodesic":
+        from .geodesic import distances
+
+        start, goal = _pixels(ends)
+        fields = distances(grid.free, start), distances(grid.free, goal)
+        return detour_heat(*fields, goal) >= REGION_BORDER
+    from ..planning.labels import rrt_region
+
+    task = grid.check_task(*ends)
+    return rrt_region(grid, task, settings.runs, settings.longest_edge, ITERATIONS, seed)
+
+
+def _pixels(ends: NDArray[np.float64]) -> tuple[tuple[int, int], tuple[int, int]]:
+    """The pixels (column, row) of start and goal."""
+    (u, v), (x, y) = ends.astype(int).tolist()
+    return (u, v), (x, y)

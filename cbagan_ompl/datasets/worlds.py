@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import check_at_least
+from ..checks import check_at_least, check_share
 from ..errors import ConfigError
-from ..map_families import FAMILIES, MIN_SIDE
+from ..map_families import FAMILIES, MIN_SIDE, check_families
 from ..map_families.variation import world_map
 from .layout import Tasks
 
@@ -54,13 +54,8 @@ class WorldSettings:
     def __post_init__(self) -> None:
         if self.size < MIN_SIDE:
             raise ConfigError(f"size must be at least {MIN_SIDE} pixels, got {self.size}")
-        unknown = [name for name in self.families if name not in FAMILIES]
-        if unknown or not self.families:
-            raise ConfigError(
-                f"unknown map family {', '.join(unknown)!r}; there are {', '.join(FAMILIES)}"
-            )
-        if not 0 <= self.hard_share <= 1:
-            raise ConfigError(f"hard_share is a share from 0 to 1, got {self.hard_share}")
+        check_families(self.families)
+        check_share("hard_share", self.hard_share)
         check_at_least("seed", self.seed, 0)
 
     def description(self) -> dict[str, Any]:

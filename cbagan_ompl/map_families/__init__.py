@@ -8,10 +8,11 @@ every version of the other libraries.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from ..errors import ConfigError
 from .buildings import maze, rooms, warehouse
 from .drawing import MIN_SIDE, Mask, without_pockets
 from .floor_plans import cell_maze, halls, offices, room_grid, shelves
@@ -27,7 +28,15 @@ from .obstacles import (
 )
 from .terrain import blocked_cells, caves, city, curved_walls, race_track
 
-__all__ = ["FAMILIES", "MIN_SIDE", "Mask", "bug_trap", "narrow_passage", "without_pockets"]
+__all__ = [
+    "FAMILIES",
+    "MIN_SIDE",
+    "Mask",
+    "bug_trap",
+    "check_families",
+    "narrow_passage",
+    "without_pockets",
+]
 
 #: Every family by its name.
 FAMILIES: dict[str, Callable[[np.random.Generator, int, int], Mask]] = {
@@ -53,3 +62,16 @@ FAMILIES: dict[str, Callable[[np.random.Generator, int, int], Mask]] = {
     "walls_with_gaps": walls_with_gaps,
     "warehouse": warehouse,
 }
+
+
+def check_families(names: Sequence[str]) -> None:
+    """Refuse a list of families that is empty or names one that is not there.
+
+    Raises:
+        ConfigError: it is; the message lists those that are.
+    """
+    unknown = [name for name in names if name not in FAMILIES]
+    if unknown or not names:
+        raise ConfigError(
+            f"unknown map family {', '.join(unknown)!r}; there are {', '.join(FAMILIES)}"
+        )
