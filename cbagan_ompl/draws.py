@@ -157,11 +157,9 @@ class DrawStream:
     def _next_learned(self, best: float) -> tuple[float, float] | None:
         """A draw of the heat map; None where it is not to be had where the tree is not yet."""
         trust = self._trust
-        if trust is None:
+        if trust is None or best < inf:
             return self._hot.next(best)
         trust.drawn()
-        if best < inf:
-            return self._hot.next(best)
         for _ in range(_MAX_SPENT):
             x, y = self._hot.next(best)
             if not trust.is_spent(x, y):

@@ -4,9 +4,10 @@
    where it does not, with a quarter of that.
 2. Before the first path no draw of the heat map goes where the tree already is. Once the tree has
    filled the region without a path, draws are uniform.
-3. The share of the heat map halves with every 128 of its draws that bring nothing: before the
-   first path no growth into new parts of the region, down to a quarter; after it no better path,
-   down to two thirds. Whatever brings something restores it.
+3. Before the first path the share of the heat map halves with every 128 of its draws that bring
+   the tree into no new part of the region, down to a quarter. Whatever brings it there restores it.
+4. After the first path draws follow the heat map again; with informed planners, where a shorter
+   path can pass.
 
 The uniform share never falls below the one that was asked for, so that a planner stays
 probabilistically complete.
@@ -25,10 +26,8 @@ from .errors import ConfigError
 from .gridmap import GridMap
 from .heatmap import Heatmap
 
-# Share of a heat map that does not join start and goal.
-_DOUBTED = 0.25
-# The least share before the first path and after it.
-_LEAST_BEFORE, _LEAST_AFTER = 0.25, 2 / 3
+# Share of a heat map that does not join start and goal, and the least one.
+_DOUBTED = _LEAST = 0.25
 # Draws of the heat map in vain that halve its share, and what one of them leaves of it.
 _HALF_LIFE = 128
 _FADING = 0.5 ** (1 / _HALF_LIFE)
@@ -41,7 +40,7 @@ class Adaptation:
     Attributes:
         doubt: begin with less where the region does not join start and goal.
         coverage: before the first path, draw from the heat map only where the tree is not yet.
-        patience: follow the heat map less while that brings nothing.
+        patience: before the first path, follow the heat map less while that brings nothing.
     """
 
     doubt: bool = True
@@ -100,7 +99,6 @@ class Trust:
         self._region = heatmap.region.tobytes()
         self._adaptation = adaptation
         self._most = 1.0
-        self._least = _LEAST_BEFORE
         self._tree = Tree(heatmap.grid, reach)
         self._count_nodes = count_nodes
         self._arrived = False
@@ -127,12 +125,11 @@ class Trust:
     def improved(self) -> None:
         """There is a first path, or a better one."""
         self.share = self._most
-        self._least = _LEAST_AFTER
 
     def drawn(self) -> None:
-        """A draw of the heat map has been handed out."""
+        """A draw of the heat map is made before the first path."""
         if self._adaptation.patience:
-            self.share = max(self.share * _FADING, min(self._most, self._least))
+            self.share = max(self.share * _FADING, _LEAST)
 
     def is_spent(self, x: float, y: float) -> bool:
         """Whether the tree is at (x, y) already, so that no draw of the heat map need go there."""
@@ -151,7 +148,6 @@ class Trust:
     def restart(self) -> None:
         """The tree is empty again."""
         self.share = self._most
-        self._least = _LEAST_BEFORE
         self._arrived = False
         self._blocked = 0
         self._tree.clear()
