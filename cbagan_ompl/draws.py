@@ -12,14 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import ConfigError, HeatmapError
-from .heatmap import Heatmap, draw_points
+from .gridmap import GridMap
+from .heatmap import Heatmap, draw_pixels, points_in
 from .trust import Trust
 
 #: Share of draws that stays uniform over free space unless the user asks otherwise.
 DEFAULT_UNIFORM_FRACTION = 0.1
 
 # The first batch is small, because small tasks need few draws; each is twice the one before.
-_FIRST_BATCH, _LARGEST_BATCH = 64, 1024
+_FIRST_BATCH, _LARGEST_BATCH = 128, 1024
 # Candidates of which a local draw picks one, with probability proportional to the heat map.
 _LOCAL_CANDIDATES = 32
 # Share of a batch inside the informed set under which the weights are made to follow the set: while
@@ -28,7 +29,7 @@ _MIN_ACCEPTED = 0.5
 
 # Draws of the heat map that may fall where the tree is already, before a uniform one takes their
 # place.
-_MAX_SPENT = 20
+_MAX_DROPPED = 20
 
 # Batches without a single point inside the informed set before a draw from outside is let through.
 _MAX_EMPTY_BATCHES = 8
@@ -58,10 +59,11 @@ class DrawStream:
 
     Each draw comes from the heat map, or with probability ``uniform_fraction`` from the uniform
     distribution over free space, so that every free pixel keeps a positive probability and the
-    planner stays probabilistically complete. With :meth:`adapt` that probability can be higher.
+    planner stays probabilistically complete.
 
     Attributes:
         rng: the generator of the draws, and of whatever else belongs to the same run.
+        chance: a number in [0, 1) at each call, drawn from it.
 
     Args:
         heatmap: where to draw.
@@ -85,9 +87,10 @@ class DrawStream:
         self.uniform = 0
         self.rng = np.random.default_rng(seed)
         # A generator of single numbers, which NumPy's is slow at.
-        self._chance = Random(int(self.rng.integers(2**63))).random
-        self._hot = _Source(heatmap, self.rng)
-        self._even = _Source(Heatmap.uniform(heatmap.grid), self.rng)
+        self.chance = Random(int(self.rng.integers(2**63))).random
+        grid, support = heatmap.grid, heatmap.support
+        self._hot = _Source(grid, support, heatmap.values.ravel()[support], self.rng)
+        self._even = _Source(grid, grid.free_pixels, None, self.rng)
         self._best_cost: Callable[[], float] = _no_cost
         self._informed_set: Callable[[], InformedSet | None] = _no_set
         self._best = inf
@@ -114,9 +117,8 @@ class DrawStream:
         self._box = low, high
         map_low, map_high = self.heatmap.grid.bounds
         if (low > map_low).any() or (high < map_high).any():
-            self._hot, self._even = (
-                _Source(source.heatmap, self.rng, self._box) for source in (self._hot, self._even)
-            )
+            self._hot.keep_inside(low, high)
+            self._even.keep_inside(low, high)
 
     def follow(
         self, best_cost: Callable[[], float], informed_set: Callable[[], InformedSet | None]
@@ -131,11 +133,16 @@ class DrawStream:
         self._best_cost = best_cost
         self._informed_set = informed_set
 
+    def prepare(self) -> None:
+        """Make the first draws now, rather than when the first one is asked for."""
+        self._hot.prepare()
+        self._even.prepare()
+
     def adapt(self, trust: Trust) -> None:
-        """Follow the heat map as far as it is trusted.
+        """Follow the heat map as far as the tree needs it.
 
         Args:
-            trust: asked at every draw of :meth:`next`.
+            trust: told of the draws of :meth:`next`, and asked where none need go.
         """
         self._trust = trust
 
@@ -144,28 +151,22 @@ class DrawStream:
         best = self._best_cost()
         if best != self._best:
             self._change_best(best)
-        share = 1 - self.uniform_fraction
-        if self._trust is not None:
-            share *= self._trust.share
-        point = self._next_learned(best) if self._chance() < share else None
-        if point is None:
-            self.uniform += 1
-            return self._even.next(best)
-        self.learned += 1
+        if self.chance() >= self.uniform_fraction:
+            trust = self._trust
+            if trust is None or best < inf:
+                point = self._hot.next(best, None)
+            else:
+                trust.drawn()
+                point = self._hot.next(best, trust.spent)
+                if point is None:
+                    trust.blocked()
+            if point is not None:
+                self.learned += 1
+                return point
+        self.uniform += 1
+        point = self._even.next(best, None)
+        assert point is not None, "nothing was to be avoided"
         return point
-
-    def _next_learned(self, best: float) -> tuple[float, float] | None:
-        """A draw of the heat map; None where it is not to be had where the tree is not yet."""
-        trust = self._trust
-        if trust is None or best < inf:
-            return self._hot.next(best)
-        trust.drawn()
-        for _ in range(_MAX_SPENT):
-            x, y = self._hot.next(best)
-            if not trust.is_spent(x, y):
-                return x, y
-        trust.blocked()
-        return None
 
     def _change_best(self, best: float) -> None:
         if (best < inf) != (self._best < inf):
@@ -194,14 +195,14 @@ class DrawStream:
         """Resample one of the candidates by its heat, or the first one as the uniform draw."""
         grid = self.heatmap.grid
         chosen, uniform = 0, True
-        if self._chance() >= self.uniform_fraction:
+        if self.chance() >= self.uniform_fraction:
             free = grid.is_free(candidates)
             columns, rows = grid.to_pixel(candidates[free]).astype(np.intp).T
             heat = np.zeros(len(candidates))
             heat[free] = self.heatmap.values[rows, columns]
             cumulative = heat.cumsum()
             if cumulative[-1] > 0:
-                threshold = self._chance() * cumulative[-1]
+                threshold = self.chance() * cumulative[-1]
                 chosen = int(np.searchsorted(cumulative, threshold, side="right"))
                 uniform = False
         self.uniform += uniform
@@ -211,33 +212,46 @@ class DrawStream:
 
 
 class _Source:
-    """Endless draws of one heat map, kept inside a box and made to follow the informed set."""
+    """Endless draws of weighted pixels, kept inside a box and made to follow the informed set.
+
+    Args:
+        grid: the map.
+        support: flat row-major indices of the pixels, (K,).
+        weights: of the pixels, (K,); None where all weigh the same.
+        rng: the generator.
+    """
 
     def __init__(
         self,
-        heatmap: Heatmap,
+        grid: GridMap,
+        support: NDArray[np.intp],
+        weights: NDArray[np.float32] | None,
         rng: np.random.Generator,
-        box: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
     ) -> None:
-        self.heatmap = heatmap
-        self._grid = heatmap.grid
+        self._grid = grid
         self._rng = rng
-        self._box = box
-        self._support = heatmap.support
-        if box is not None:
-            # Pixels that the box cuts keep their weight, the draws outside are dropped.
-            reach = self._grid.resolution * np.sqrt(0.5)
-            touching = _inside(self._centres(), box[0] - reach, box[1] + reach)
-            self._support = self._support[touching]
-            if not len(self._support):
-                raise HeatmapError(
-                    f"the heat map of {self._grid.name} is 0 everywhere in the space, which spans "
-                    f"x {box[0][0]:g} to {box[1][0]:g} and y {box[0][1]:g} to {box[1][1]:g}; the "
-                    "space must be in the coordinates of the map"
-                )
-        self._weights = heatmap.values.ravel()[self._support].astype(np.float64)
+        self._support = support
+        self._weights = weights
+        self._box: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
         self._batch = _FIRST_BATCH
-        self._pending: list[tuple[float, float, float]] = []
+        self._pending: list[tuple[float, float, float, int]] = []
+        self.inform(None)
+
+    def keep_inside(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> None:
+        """Draw only inside a box."""
+        # Pixels that the box cuts keep their weight, the draws outside are dropped.
+        reach = self._grid.resolution * np.sqrt(0.5)
+        touching = _inside(self._centres(), low - reach, high + reach)
+        if not touching.any():
+            raise HeatmapError(
+                f"the heat map of {self._grid.name} is 0 everywhere in the space, which spans "
+                f"x {low[0]:g} to {high[0]:g} and y {low[1]:g} to {high[1]:g}; the "
+                "space must be in the coordinates of the map"
+            )
+        self._support = self._support[touching]
+        if self._weights is not None:
+            self._weights = self._weights[touching]
+        self._box = low, high
         self.inform(None)
 
     def inform(self, informed: InformedSet | None) -> None:
@@ -248,30 +262,49 @@ class _Source:
         self._pending.clear()
         self._weigh(inf)
 
-    def next(self, best: float) -> tuple[float, float]:
-        """The next draw, (x, y) in world coordinates, where a path cheaper than ``best`` passes."""
+    def next(self, best: float, avoid: bytearray | None) -> tuple[float, float] | None:
+        """The next draw, (x, y) in world coordinates, where a path cheaper than ``best`` passes.
+
+        Args:
+            best: cost of the best known path.
+            avoid: row-major bytes of the pixels, 1 where draws are dropped; None drops none.
+
+        Returns:
+            None when too many draws in a row had to be dropped for ``avoid``.
+        """
+        dropped = 0
         for _ in range(_MAX_EMPTY_BATCHES):
             while self._pending:
-                x, y, bound = self._pending.pop()
+                x, y, bound, pixel = self._pending.pop()
                 if bound <= best:
-                    return x, y
+                    if avoid is None or not avoid[pixel]:
+                        return x, y
+                    dropped += 1
+                    if dropped == _MAX_DROPPED:
+                        return None
             self._refill(best)
         # Nothing of the map is in the informed set: any draw is as good as another.
-        x, y, _ = self._pending.pop()
+        x, y, _, _ = self._pending.pop()
         return x, y
+
+    def prepare(self) -> None:
+        """Make a batch of draws."""
+        if not self._pending:
+            self._refill(inf)
 
     def _refill(self, best: float) -> None:
         size, self._batch = self._batch, min(2 * self._batch, _LARGEST_BATCH)
         if self._accepted < _MIN_ACCEPTED:
             self._weigh(best)
-        points = draw_points(self._grid, self._active, self._cumulative, size, self._rng)
+        pixels = draw_pixels(self._active, self._cumulative, size, self._rng)
+        points = points_in(self._grid, pixels, self._rng)
         bounds = np.full(size, -inf)
         if self._informed is not None:
             bounds = self._informed.shortest_through(points)
             self._accepted = float((bounds <= best).mean())
         if self._box is not None:
             bounds[~_inside(points, *self._box)] = nan  # no cost is above it: never handed out
-        columns = points[:, 0], points[:, 1], bounds
+        columns = points[:, 0], points[:, 1], bounds, pixels
         self._pending = list(zip(*(column.tolist() for column in columns), strict=True))
 
     def _weigh(self, best: float) -> None:
@@ -285,8 +318,9 @@ class _Source:
                 self._bounds = self._informed.shortest_through(self._centres()) - slack
             inside = np.asarray(self._bounds <= best)
             if inside.any():
-                self._active, weights = self._support[inside], self._weights[inside]
-        self._cumulative = weights.cumsum()
+                self._active = self._support[inside]
+                weights = None if weights is None else weights[inside]
+        self._cumulative = None if weights is None else weights.cumsum(dtype=np.float64)
 
     def _centres(self) -> NDArray[np.float64]:
         rows, columns = np.divmod(self._support, self._grid.width)

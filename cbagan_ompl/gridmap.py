@@ -145,6 +145,11 @@ class GridMap:
         return self.free.tobytes()
 
     @cached_property
+    def free_pixels(self) -> NDArray[np.intp]:
+        """Flat row-major indices of the free pixels, ascending, shape (K,)."""
+        return np.flatnonzero(self.free)
+
+    @cached_property
     def pixel_from_world(self) -> Affine:
         """World (x, y) -> pixel (u, v)."""
         scale = 1 / self.resolution

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -133,6 +134,12 @@ class Heatmap:
         """The promising region: values from :data:`REGION_BORDER` on, shape (H, W)."""
         return self.values >= REGION_BORDER
 
+    @cached_property
+    def parts(self) -> NDArray[np.int32]:
+        """The 4-connected parts of the region, numbered from 1; 0 outside of it, shape (H, W)."""
+        parts = cv2.connectedComponents(self.region.view(np.uint8), connectivity=4)[1]
+        return np.asarray(parts, np.int32)
+
     def joins(self, start: ArrayLike, goal: ArrayLike) -> bool:
         """Whether the region holds both ends and a 4-connected way between them.
 
@@ -140,10 +147,9 @@ class Heatmap:
             start: (x, y), world.
             goal: (x, y), world.
         """
-        parts = cv2.connectedComponents(self.region.astype(np.uint8), connectivity=4)[1]
         first, second = _pixel_pair(self.grid.to_pixel(np.array((start, goal))))
-        label = int(parts[first[1], first[0]])
-        return label > 0 and label == int(parts[second[1], second[0]])
+        label = int(self.parts[first[1], first[0]])
+        return label > 0 and label == int(self.parts[second[1], second[0]])
 
     def joined(self, start: ArrayLike, goal: ArrayLike) -> Heatmap:
         """This heat map with a region that joins start and goal.
@@ -186,7 +192,8 @@ class Heatmap:
             World points, shape (n, 2).
         """
         generator = np.random.default_rng(rng)
-        return draw_points(self.grid, self._support, self._cumulative, n, generator)
+        pixels = draw_pixels(self._support, self._cumulative, n, generator)
+        return points_in(self.grid, pixels, generator)
 
     @property
     def support(self) -> NDArray[np.intp]:
@@ -198,29 +205,47 @@ class Heatmap:
         return f"Heatmap({self.grid.name!r}, region {share:.0%} of free space)"
 
 
-def draw_points(
-    grid: GridMap,
+def draw_pixels(
     support: NDArray[np.intp],
-    cumulative: NDArray[np.float64],
+    cumulative: NDArray[np.float64] | None,
     n: int,
     rng: np.random.Generator,
+) -> NDArray[np.intp]:
+    """Draw some of the pixels of a heat map.
+
+    Args:
+        support: flat row-major pixel indices, shape (K,).
+        cumulative: cumulative sum of their weights, shape (K,), the last one above 0; None where
+            all weigh the same.
+        n: how many.
+        rng: the generator.
+
+    Returns:
+        Flat row-major pixel indices, shape (n,).
+    """
+    if cumulative is None:
+        chosen = rng.integers(len(support), size=n)
+    else:
+        chosen = np.searchsorted(cumulative, rng.random(n) * cumulative[-1], side="right")
+    pixels: NDArray[np.intp] = support[np.minimum(chosen, len(support) - 1)]
+    return pixels
+
+
+def points_in(
+    grid: GridMap, pixels: NDArray[np.intp], rng: np.random.Generator
 ) -> NDArray[np.float64]:
-    """Draw world points from weighted pixels, uniform inside each pixel.
+    """A uniform point in each of some pixels.
 
     Args:
         grid: the map.
-        support: flat row-major pixel indices, shape (K,).
-        cumulative: cumulative sum of their weights, shape (K,), the last one above 0.
-        n: how many points.
+        pixels: flat row-major indices, shape (n,).
         rng: the generator.
 
     Returns:
         World points, shape (n, 2).
     """
-    chosen = np.searchsorted(cumulative, rng.random(n) * cumulative[-1], side="right")
-    pixels = support[np.minimum(chosen, len(support) - 1)]
     corners = np.stack((pixels % grid.width, pixels // grid.width), axis=-1)
-    return grid.to_world(corners + rng.random((n, 2)))
+    return grid.to_world(corners + rng.random((len(pixels), 2)))
 
 
 def _to_unit_range(raw: NDArray[Any]) -> NDArray[np.float32]:

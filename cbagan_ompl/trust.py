@@ -1,15 +1,15 @@
 """How far a planner's draws follow the heat map: as far as that brings the planner on.
 
-1. Draws follow the heat map with all but the uniform share, where its region joins start and goal;
-   where it does not, with a quarter of that.
+1. Where the region joins start and goal, all draws of the planner are ours. Where it does not, six
+   of seven are left to OMPL's own sampler.
 2. Before the first path no draw of the heat map goes where the tree already is. Once the tree has
-   filled the region without a path, draws are uniform.
-3. Before the first path the share of the heat map halves with every 128 of its draws that bring
-   the tree into no new part of the region, down to a quarter. Whatever brings it there restores it.
+   filled the region without a path, our draws are uniform.
+3. Before the first path our share halves with every 128 draws of the heat map that bring the tree
+   into no new part of the region, down to a quarter. Whatever brings it there restores it.
 4. After the first path draws follow the heat map again; with informed planners, where a shorter
    path can pass.
 
-The uniform share never falls below the one that was asked for, so that a planner stays
+Of our draws the share that was asked for stays uniform throughout, so that a planner stays
 probabilistically complete.
 """
 
@@ -26,11 +26,10 @@ from .errors import ConfigError
 from .gridmap import GridMap
 from .heatmap import Heatmap
 
-# Share of a heat map that does not join start and goal, and the least one.
-_DOUBTED = _LEAST = 0.25
-# Draws of the heat map in vain that halve its share, and what one of them leaves of it.
+# Our share with a region that does not join start and goal, and the least one.
+_DOUBTED, _LEAST = 0.15, 0.25
+# Draws of the heat map in vain that halve our share.
 _HALF_LIFE = 128
-_FADING = 0.5 ** (1 / _HALF_LIFE)
 
 
 @dataclass(frozen=True)
@@ -76,16 +75,19 @@ NO_ADAPTATION = Adaptation.of(())
 
 
 class Trust:
-    """What a stream of draws knows of the tree that it feeds.
+    """What is known of the tree that draws feed, and what follows from it.
 
     Attributes:
-        share: of the draws that are not uniform anyway, those that follow the heat map, in (0, 1].
+        spent: row-major bytes of the pixels, 1 where no draw of the heat map need go before the
+            first path; None while that is everywhere.
 
     Args:
         heatmap: that is drawn from.
         adaptation: the parts that are on.
         reach: how far around a node its tree is taken to be, at most, world units.
         count_nodes: number of nodes of the tree.
+        set_share: told the share of draws that is to be left to the heat map and its uniform
+            share; the others are the planner's own.
     """
 
     def __init__(
@@ -94,15 +96,19 @@ class Trust:
         adaptation: Adaptation,
         reach: float,
         count_nodes: Callable[[], int],
+        set_share: Callable[[float], None],
     ) -> None:
-        self.share = 1.0
-        self._region = heatmap.region.tobytes()
+        # Also the numbers of the parts are made here, before the planner plans.
+        self._region = heatmap.parts.astype(np.bool_).tobytes()
         self._adaptation = adaptation
-        self._most = 1.0
         self._tree = Tree(heatmap.grid, reach)
+        self.spent = self._tree.cells if adaptation.coverage else None
         self._count_nodes = count_nodes
+        self._set_share = set_share
+        self._share = self._most = 1.0
+        self._vain = self._blocked = 0
         self._arrived = False
-        self._blocked = 0
+        self._is_followed = True
 
     def begin(self, joined: bool) -> None:
         """The planner has begun to plan.
@@ -111,29 +117,33 @@ class Trust:
             joined: whether the region joins start and goal.
         """
         if self._adaptation.doubt and not joined:
-            self._most = self.share = _DOUBTED
+            self._most = _DOUBTED
+            self._follow(_DOUBTED)
+            # For so few draws it does not pay to follow the tree.
+            self._is_followed, self.spent = False, None
 
     def grown(self, x: float, y: float, arrived: bool) -> None:
         """The tree has a new node at (x, y), world; ``arrived`` when it is in the goal."""
+        if not self._is_followed:
+            return
         if self._arrived and not arrived:
             self.restart()  # a planner that ends with its first path has begun anew
         pixel = self._tree.add(x, y)
         if pixel is not None and self._region[pixel]:
-            self.share = self._most
+            self._vain = 0
+            self._follow(self._most)
         self._arrived = arrived
 
     def improved(self) -> None:
         """There is a first path, or a better one."""
-        self.share = self._most
+        self._follow(self._most)
 
     def drawn(self) -> None:
         """A draw of the heat map is made before the first path."""
-        if self._adaptation.patience:
-            self.share = max(self.share * _FADING, _LEAST)
-
-    def is_spent(self, x: float, y: float) -> bool:
-        """Whether the tree is at (x, y) already, so that no draw of the heat map need go there."""
-        return self._adaptation.coverage and self._tree.covers(x, y)
+        self._vain += 1
+        if self._vain >= _HALF_LIFE and self._adaptation.patience:
+            self._vain = 0
+            self._follow(max(self._share / 2, _LEAST))
 
     def blocked(self) -> None:
         """No draw of the heat map was worth handing out.
@@ -147,10 +157,15 @@ class Trust:
 
     def restart(self) -> None:
         """The tree is empty again."""
-        self.share = self._most
+        self._vain = self._blocked = 0
         self._arrived = False
-        self._blocked = 0
         self._tree.clear()
+        self._follow(self._most)
+
+    def _follow(self, share: float) -> None:
+        if share != self._share:
+            self._share = share
+            self._set_share(share)
 
 
 class Tree:
@@ -161,6 +176,7 @@ class Tree:
 
     Attributes:
         nodes: how many there are.
+        cells: row-major bytes of the pixels, 1 where the tree is.
 
     Args:
         grid: the map.
@@ -171,12 +187,11 @@ class Tree:
         self.nodes = 0
         self._affine = tuple(grid.pixel_from_world)
         self._width, self._height = grid.width, grid.height
-        self._cells = bytearray(grid.width * grid.height)
-        self._covered = np.frombuffer(self._cells, np.uint8).reshape(grid.shape)
-        clearance = cv2.distanceTransform(
-            grid.free.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE
-        )
-        self._half = np.clip(clearance, 1, max(1.0, reach / grid.resolution)).astype(np.int32)
+        self.cells = bytearray(grid.width * grid.height)
+        self._covered = np.frombuffer(self.cells, np.uint8).reshape(grid.shape)
+        # Quick to within a hundredth, which is near enough here.
+        clearance = cv2.distanceTransform(grid.free.view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+        self._half = np.minimum(clearance, reach / grid.resolution).astype(np.int32)
 
     def add(self, x: float, y: float) -> int | None:
         """Note a node at (x, y), world; the row-major number of its pixel if it is new ground."""
@@ -185,17 +200,11 @@ class Tree:
         if not (0 <= u < self._width and 0 <= v < self._height):
             return None
         pixel = v * self._width + u
-        if self._cells[pixel]:
+        if self.cells[pixel]:
             return None
-        half = int(self._half[v, u])
+        half = max(1, int(self._half[v, u]))
         self._covered[max(0, v - half) : v + half + 1, max(0, u - half) : u + half + 1] = 1
         return pixel
-
-    def covers(self, x: float, y: float) -> bool:
-        """Whether (x, y), world, is near a node."""
-        u, v = self._pixel(x, y)
-        inside = 0 <= u < self._width and 0 <= v < self._height
-        return inside and self._cells[v * self._width + u] == 1
 
     def clear(self) -> None:
         """Forget all nodes."""

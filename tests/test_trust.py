@@ -15,8 +15,11 @@ from cbagan_ompl.trust import FULL_ADAPTATION, NO_ADAPTATION, Adaptation, Tree, 
 
 def make_trust(
     heatmap: Heatmap, adaptation: Adaptation = FULL_ADAPTATION, nodes: int = 10**9
-) -> Trust:
-    return Trust(heatmap, adaptation, reach=16.0, count_nodes=lambda: nodes)
+) -> tuple[Trust, list[float]]:
+    """A trust, and the shares that it sets, the latest one last."""
+    shares = [1.0]
+    trust = Trust(heatmap, adaptation, 16.0, lambda: nodes, shares.append)
+    return trust, shares
 
 
 def adapted(heatmap: Heatmap, trust: Trust) -> DrawStream:
@@ -27,23 +30,26 @@ def adapted(heatmap: Heatmap, trust: Trust) -> DrawStream:
 
 def test_a_node_covers_no_more_than_its_clearance(two_walls: GridMap) -> None:
     tree = Tree(two_walls, reach=16.0)
+
+    def covers(x: float, y: float) -> bool:
+        return tree.cells[int(y) * 256 + int(x)] == 1
+
     assert tree.add(100.0, 53.0) == 53 * 256 + 100
-    assert tree.covers(105.0, 50.0)
-    assert not tree.covers(100.0, 75.0), "the other side of the wall"
-    assert not tree.covers(100.0, 30.0)
+    assert covers(105.0, 50.0)
+    assert not covers(100.0, 75.0), "the other side of the wall"
+    assert not covers(100.0, 30.0)
     assert tree.add(101.0, 54.0) is None, "no new ground"
     assert tree.add(200.5, 110.5) is not None
-    assert tree.covers(184.5, 126.5)
-    assert not tree.covers(180.0, 110.0), "farther than the reach"
+    assert covers(184.5, 126.5)
+    assert not covers(180.0, 110.0), "farther than the reach"
     assert tree.add(-3.0, 500.0) is None
-    assert not tree.covers(-3.0, 500.0)
     assert tree.nodes == 4
     tree.clear()
-    assert not tree.covers(100.0, 53.0)
+    assert not covers(100.0, 53.0)
 
 
 def test_before_the_first_path_draws_go_where_the_tree_is_not(corridor: Heatmap) -> None:
-    trust = make_trust(corridor, Adaptation.of(["coverage"]))
+    trust, _ = make_trust(corridor, Adaptation.of(["coverage"]))
     stream = adapted(corridor, trust)
     for x in range(5, 256, 5):
         for y in range(5, 60, 5):
@@ -56,7 +62,7 @@ def test_before_the_first_path_draws_go_where_the_tree_is_not(corridor: Heatmap)
 
 
 def test_a_region_full_of_tree_leaves_uniform_draws(corridor: Heatmap) -> None:
-    trust = make_trust(corridor, Adaptation.of(["coverage"]))
+    trust, _ = make_trust(corridor, Adaptation.of(["coverage"]))
     stream = adapted(corridor, trust)
     for x in np.arange(2.0, 256, 2):
         for y in np.arange(2.0, 256, 2):
@@ -67,7 +73,7 @@ def test_a_region_full_of_tree_leaves_uniform_draws(corridor: Heatmap) -> None:
 
 
 def test_after_a_path_draws_follow_the_whole_region(corridor: Heatmap) -> None:
-    trust = make_trust(corridor)
+    trust, _ = make_trust(corridor)
     stream = adapted(corridor, trust)
     for x in np.arange(2.0, 256, 2):
         for y in np.arange(2.0, 256, 2):
@@ -79,45 +85,49 @@ def test_after_a_path_draws_follow_the_whole_region(corridor: Heatmap) -> None:
 
 
 def test_draws_in_vain_cost_the_heat_map_its_share(corridor: Heatmap) -> None:
-    trust = make_trust(corridor, Adaptation.of(["patience"]))
-    for _ in range(128):
+    trust, shares = make_trust(corridor, Adaptation.of(["patience"]))
+    for _ in range(127):
         trust.drawn()
-    assert trust.share == pytest.approx(0.5)
+    assert shares == [1.0]
+    trust.drawn()
+    assert shares[-1] == 0.5
     for _ in range(1000):
         trust.drawn()
-    assert trust.share == 0.25
+    assert shares[-1] == 0.25
     row, column = np.argwhere(corridor.region)[0]
     trust.grown(column + 0.5, row + 0.5, arrived=False)
-    assert trust.share == 1.0, "new ground in the region restores it"
+    assert shares[-1] == 1.0, "new ground in the region restores it"
     for _ in range(1000):
         trust.drawn()
     row, column = np.argwhere(corridor.grid.free & (corridor.values == 0))[0]
     trust.grown(column + 0.5, row + 0.5, arrived=False)
-    assert trust.share == 0.25, "new ground elsewhere does not"
+    assert shares[-1] == 0.25, "new ground elsewhere does not"
     trust.improved()
-    assert trust.share == 1.0, "there is a path"
+    assert shares[-1] == 1.0, "there is a path"
 
 
 def test_a_region_that_joins_nothing_is_doubted(corridor: Heatmap) -> None:
-    for adaptation, share in ((FULL_ADAPTATION, 0.25), (NO_ADAPTATION, 1.0)):
-        trust = make_trust(corridor, adaptation)
-        trust.begin(joined=False)
-        assert trust.share == share
-    trust = make_trust(corridor)
-    trust.begin(joined=True)
-    assert trust.share == 1.0
+    for adaptation, joined, share in (
+        (FULL_ADAPTATION, False, 0.15),
+        (FULL_ADAPTATION, True, 1.0),
+        (NO_ADAPTATION, False, 1.0),
+    ):
+        trust, shares = make_trust(corridor, adaptation)
+        trust.begin(joined)
+        assert shares[-1] == share
 
 
 def test_a_cleared_tree_is_noticed(corridor: Heatmap) -> None:
-    trust = make_trust(corridor, nodes=0)
+    trust, _ = make_trust(corridor, nodes=0)
     trust.grown(20.0, 20.0, arrived=False)
-    assert trust.is_spent(20.0, 20.0)
+    assert any(trust.spent)
     trust.blocked()
-    assert not trust.is_spent(20.0, 20.0)
-    again = make_trust(corridor)
+    assert not any(trust.spent)
+    again, _ = make_trust(corridor)
     again.grown(20.0, 20.0, arrived=True)
     again.grown(100.0, 100.0, arrived=False)  # a planner that stops at its first path starts anew
-    assert not again.is_spent(20.0, 20.0)
+    assert not again.spent[20 * 256 + 20]
+    assert again.spent[100 * 256 + 100]
 
 
 def test_unknown_parts_are_refused() -> None:

@@ -122,6 +122,7 @@ def attach(
     )
     parts = _Parts(setup, planner, name, positions, stream, progress, adaptation)
     undo_hook = _INSTALL[hook](parts)
+    stream.prepare()
 
     def undo() -> None:
         progress.release()
@@ -225,11 +226,17 @@ def _inject_goals(parts: _Parts) -> Callable[[], None]:
     setup, planner = parts.setup, parts.planner
     original, bias = setup.getGoal(), planner.getGoalBias()
     si = setup.getSpaceInformation()
-    trust = Trust(parts.stream.heatmap, parts.adaptation, _reach(planner, si), parts.progress.nodes)
+    trust = Trust(
+        parts.stream.heatmap,
+        parts.adaptation,
+        _reach(planner, si),
+        parts.progress.nodes,
+        parts.progress.set_share,
+    )
     parts.stream.adapt(trust)
     injected = InjectedGoal(si, original, parts.positions, parts.stream, parts.progress, trust)
     setup.setGoal(injected)
-    planner.setGoalBias(1.0)
+    parts.progress.set_share(1.0)
 
     def undo() -> None:
         if setup.getGoal() is injected:

@@ -43,7 +43,8 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
         trust: Trust,
     ) -> None:
         super().__init__(si)
-        self.setThreshold(original.getThreshold())
+        self._threshold = original.getThreshold()
+        self.setThreshold(self._threshold)
         self._original = original
         self._positions = positions
         self._stream = stream
@@ -53,8 +54,9 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
 
     def distanceGoal(self, state: Any) -> float:  # noqa: N802
         """Distance to the original goal, which planners ask for every new node of their tree."""
-        distance = float(self._original.distanceGoal(state))
-        self._trust.grown(*self._positions.read(state), arrived=distance < self.getThreshold())
+        distance: float = self._original.distanceGoal(state)
+        x, y = self._positions.read(state)
+        self._trust.grown(x, y, distance < self._threshold)
         return distance
 
     def maxSampleCount(self) -> int:  # noqa: N802
@@ -73,7 +75,11 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
         if sampling and not self._began:
             self._began = True
             self._trust.begin(progress.joins(self._stream.heatmap))
-        if not sampling or (not progress.has_solution and self._stream.rng.random() < _GOAL_BIAS):
+        if not sampling or (not progress.has_solution and self._is_goals_turn()):
             self._original.sampleGoal(state)
         else:
             self._positions.write(state, *self._stream.next())
+
+    def _is_goals_turn(self) -> bool:
+        """Whether the real goal is due, as often among all draws as with OMPL's own goal bias."""
+        return self._stream.chance() * self._progress.share < _GOAL_BIAS

@@ -26,6 +26,9 @@ class PlannerProgress:
     collector sees. :meth:`release` cuts it; at interpreter exit all are cut, because OMPL 2.0
     reports every object that is left.
 
+    Attributes:
+        share: of the planner's draws, those that it asks the goal for.
+
     Args:
         setup: a SimpleSetup with its planner and its own goal.
         positions: access to the positions of its states.
@@ -38,6 +41,7 @@ class PlannerProgress:
         self._positions = positions
         self._counts_iterations = hasattr(self._planner, "numIterations")
         self._last_iteration = 0
+        self.share = 1.0
         _alive.add(self)
 
     @property
@@ -106,6 +110,12 @@ class PlannerProgress:
     def nodes(self) -> int:
         """Number of nodes of the tree."""
         return 0 if self._planner is None else int(planner_data(self._planner).numVertices())
+
+    def set_share(self, share: float) -> None:
+        """Leave all but a share of the draws to the planner's own sampler."""
+        self.share = share
+        if self._planner is not None:
+            self._planner.setGoalBias(share)
 
     def refers_to(self, planner: Any) -> bool:
         """Whether this is the progress of a planner."""
