@@ -67,7 +67,6 @@ class Heatmap:
         self.values: NDArray[np.float32] = scaled
         self.grid = grid
         self._support = np.flatnonzero(scaled)
-        self._cumulative = np.cumsum(scaled.ravel()[self._support], dtype=np.float64)
 
     @classmethod
     def load(cls, path: str | PathLike[str], grid: GridMap) -> Heatmap:
@@ -192,7 +191,8 @@ class Heatmap:
             World points, shape (n, 2).
         """
         generator = np.random.default_rng(rng)
-        pixels = draw_pixels(self._support, self._cumulative, n, generator)
+        cumulative = self.values.ravel()[self._support].cumsum(dtype=np.float64)
+        pixels = draw_pixels(self._support, cumulative, n, generator)
         return points_in(self.grid, pixels, generator)
 
     @property

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
@@ -77,12 +78,22 @@ def draw_plan(result: PlanResult, grid: GridMap) -> Figure:
     axes = figure.add_axes(
         ((width - map_width) / 2 / width, _LEGEND / height, map_width / width, map_height / height)
     )
-    handles = _draw_map(axes, result, grid) + _draw_plan(axes, result, grid)
-    _frame_axes(axes, grid)
+    handles = draw_heatmap(axes, result, grid)
     figure.text(0.5, 1 - 0.25 / height, _headline(result), ha="center", va="center", fontsize=11)
     figure.text(0.5, 1 - 0.48 / height, _figures(result), ha="center", va="center", fontsize=9)
     figure.legend(handles=handles, loc="lower center", ncols=4, frameon=False, fontsize=9)
     return figure
+
+
+def draw_heatmap(axes: Axes, result: PlanResult, grid: GridMap) -> list[Artist]:
+    """Draw a plan on some axes; ``result`` and ``grid`` as for :func:`save_picture`.
+
+    Returns:
+        What a legend needs.
+    """
+    handles = [*_draw_map(axes, result, grid), *_draw_plan(axes, result, grid)]
+    axes.set(xlim=(0, grid.width), ylim=(grid.height, 0), xticks=[], yticks=[])
+    return handles
 
 
 def _draw_map(axes: Axes, result: PlanResult, grid: GridMap) -> list[Patch]:
@@ -137,13 +148,6 @@ def _draw_plan(axes: Axes, result: PlanResult, grid: GridMap) -> list[Line2D]:
             zorder=5,
         )
     return handles
-
-
-def _frame_axes(axes: Axes, grid: GridMap) -> None:
-    axes.set_xlim(0, grid.width)
-    axes.set_ylim(grid.height, 0)
-    axes.set_xticks([])
-    axes.set_yticks([])
 
 
 def _headline(result: PlanResult) -> str:

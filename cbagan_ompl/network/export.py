@@ -16,7 +16,7 @@ from torch.nn import functional
 from ..errors import ModelError
 from .checkpoints import best_generator, load_checkpoint
 from .encoding import map_image, point_image, region_probability
-from .generator import Generator, stride_of
+from .generator import Generator, ResidualBlock, stride_of
 from .model_files import MANIFEST, RECORD_NAME, RECORD_SCHEMA, read_manifest, sha256
 
 INPUTS = (
@@ -89,6 +89,7 @@ def export(
         target.touch()
     except OSError as error:
         raise ModelError(f"cannot write {target}: {error.strerror or error}") from error
+    fold_shortcuts(model)
     save_script(model, target, record)
     target.with_suffix(".md").write_text(model_card(record), encoding="utf-8")
     _update_manifest(target)
@@ -105,6 +106,33 @@ def save_script(model: nn.Module, path: Path, record: dict[str, Any]) -> None:
         frozen = torch.jit.freeze(torch.jit.script(model))
         extra = {RECORD_NAME: json.dumps(record, indent=1)}
         torch.jit.save(frozen, str(path), _extra_files=extra)
+
+
+def fold_shortcuts(module: nn.Module) -> None:
+    """Make the pooling, 1x1 convolution and batch norm of each shortcut one convolution.
+
+    The mean of a patch and a 1x1 convolution of it are one convolution with the stride of the
+    patch, which a CPU does in a fraction of the time.
+
+    Args:
+        module: in evaluation mode; changed in place.
+    """
+    for block in module.modules():
+        if isinstance(block, ResidualBlock) and isinstance(block.shortcut, nn.Sequential):
+            block.shortcut = _folded(*block.shortcut)
+
+
+def _folded(pool: nn.AvgPool2d, conv: nn.Conv2d, norm: nn.BatchNorm2d) -> nn.Conv2d:
+    assert norm.running_mean is not None
+    assert norm.running_var is not None
+    size = int(pool.kernel_size)  # type: ignore[arg-type]
+    folded = nn.Conv2d(conv.in_channels, conv.out_channels, size, stride=size)
+    scale = norm.weight * torch.rsqrt(norm.running_var + norm.eps)
+    with torch.no_grad():
+        folded.weight.copy_(conv.weight * scale[:, None, None, None] / size**2)
+        assert folded.bias is not None
+        folded.bias.copy_(norm.bias - norm.running_mean * scale)
+    return folded
 
 
 def make_record(
@@ -164,13 +192,12 @@ point discriminator, exported as TorchScript on {record["date"]} with torch {rec
 - Input: {record["inputs"]}
 - Output: {record["outputs"]}
 - Parameters: {record["parameters"]:,}
-- Larger maps are scaled down to {record["working_size"]} pixels on the longer side, the size of
-  the training images.
+- Maps are scaled to {record["working_size"]} pixels on the longer side, the size of the training
+  images.
 
 ## Data
 
-`{dataset["name"]}`: {dataset["maps"]} maps of {dataset["side"]} x {dataset["side"]} pixels,
-{dataset["train_tasks"]} tasks for training and validation, {dataset["test_tasks"]} for testing.
+{_data(dataset)}
 
 {record["note"] or "Licence and origin of the data: not stated."}
 
@@ -195,6 +222,28 @@ Epoch {record["epoch"]} of:
 
 {recipe}
 """
+
+
+def _data(dataset: dict[str, Any]) -> str:
+    """What a model was trained on."""
+    side = dataset["side"]
+    if "worlds" not in dataset:
+        return (
+            f"`{dataset['name']}`: {dataset['maps']} maps of {side} x {side} pixels,\n"
+            f"{dataset['train_tasks']} tasks for training and validation, "
+            f"{dataset['test_tasks']} for testing."
+        )
+    worlds = dataset["worlds"]
+    return (
+        f"Drawn while it was trained (`cbagan-ompl train --worlds`, seed {worlds['seed']}): "
+        f"{dataset['maps']} new maps of {side} x {side}\n"
+        f"pixels in each epoch with {dataset['train_tasks']} tasks, "
+        f"{worlds['hard_share']:.0%} of them hard; {dataset['test_tasks']} tasks on other maps\n"
+        "for testing. The label of a pixel falls with the detour that a path through it takes, to "
+        "0.5 at\n"
+        f"{worlds['label']['epsilon']:.0%} and {worlds['label']['slack']:g} pixel. Families: "
+        f"{', '.join(worlds['families'])}."
+    )
 
 
 def _network(recipe: dict[str, Any]) -> str:

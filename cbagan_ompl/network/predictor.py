@@ -145,5 +145,7 @@ def scaled_free(free: NDArray[np.bool_], shape: tuple[int, int]) -> NDArray[np.b
         free: (H, W).
         shape: (h, w).
     """
+    if shape == free.shape:
+        return free
     rows, columns = (np.arange(n) * size // n for n, size in zip(shape, free.shape, strict=True))
     return np.logical_or.reduceat(np.logical_or.reduceat(free, rows, axis=0), columns, axis=1)

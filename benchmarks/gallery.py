@@ -1,0 +1,43 @@
+"""The picture of the README that shows what the bundled model paints on the bundled maps.
+
+python benchmarks/gallery.py --output docs/regions.png
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from matplotlib.figure import Figure
+
+from cbagan_ompl import GridMap, load_model, plan, tasks_of
+from cbagan_ompl.picture import draw_heatmap
+
+#: Maps, and which of their tasks is shown.
+SHOWN = {"rooms": 0, "maze": 1, "warehouse": 1, "bug_trap": 0, "narrow_passage": 1, "clutter": 0}
+COLUMNS = 3
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--model", metavar="FILE")
+    parser.add_argument("--output", required=True, metavar="FILE")
+    args = parser.parse_args()
+    predictor = load_model(args.model)
+    figure = Figure(figsize=(9.0, 6.1), layout="constrained")
+    places = figure.subplots(len(SHOWN) // COLUMNS, COLUMNS, squeeze=False)
+    for axes, (name, number) in zip(places.flat, SHOWN.items(), strict=True):
+        grid = GridMap.load(f"bundled:{name}")
+        task = tasks_of(f"bundled:{name}", grid)[number]
+        result = plan(grid, task.start, task.goal, "RRT", model=predictor, range=20, seed=0)
+        raw = predictor.predict(grid, task.start, task.goal, repair=False)
+        draw_heatmap(axes, result, grid)
+        joined = "joined" if raw.joins(task.start, task.goal) else "repaired"
+        axes.set_title(
+            f"{name}: {joined}, {1e3 * result.inference_s:.0f} ms, RRT {result.nodes} nodes",
+            fontsize=8,
+        )
+    figure.savefig(args.output, dpi=110)
+
+
+if __name__ == "__main__":
+    main()
