@@ -350,7 +350,7 @@ def test_train_and_export_on_worlds(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert record["working_size"] == 64
     assert record["dataset"]["worlds"]["families"] == ["blocks", "caves"]
     assert record["dataset"]["worlds"]["hard_share"] == 0.5
-    assert "`worlds`: 2 maps of 64 x 64" in (tmp_path / "worlds.md").read_text()
+    assert "2 new maps of 64 x 64" in (tmp_path / "worlds.md").read_text()
     grid = GridMap(np.ones((100, 70)))
     assert load_model(tmp_path / "worlds.pt").predict(grid, (5, 5), (60, 90)).region.any()
 

@@ -1,0 +1,96 @@
+"""How peaked should a heat map be? Planning with powers of it, on generated maps.
+
+    python benchmarks/sharpness.py --json benchmarks/results/sharpness.json --plot sharpness.png
+
+A power of the heat map makes it as if the network had been taught a narrower region: a power of 2
+halves the detour at which a value falls to one half. The maps are drawn as those of training are,
+but from another part of the sequence. Ratios are to OMPL's own sampler, medians over the tasks.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import defaultdict
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from tqdm import trange
+
+from cbagan_ompl import GridMap, Heatmap, PlanResult, load_model, plan
+from cbagan_ompl.datasets.geodesic import distances
+from cbagan_ompl.datasets.worlds import WorldSettings, draw_world
+from cbagan_ompl.files import write_json
+from cbagan_ompl.planning.compat import ompl_version
+
+POWERS = (0.5, 1.0, 2.0, 4.0)
+RANGE, TIME, WITHIN = 20.0, 0.5, 1.05
+MEASURES = {"RRT": "nodes", "RRTstar": "time to 5 %", "InformedRRTstar": "time to 5 %"}
+# Training draws from part 0, validation and test from parts 1 and 2.
+PART = 3
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--model", metavar="FILE")
+    parser.add_argument("--maps", type=int, default=60, help="one task on each (default: 60)")
+    parser.add_argument("--json", metavar="FILE")
+    parser.add_argument("--plot", metavar="FILE")
+    args = parser.parse_args()
+    predictor = load_model(args.model)
+    ratios: dict[str, dict[float, list[float]]] = defaultdict(lambda: defaultdict(list))
+    for number in trange(args.maps):
+        world = draw_world(WorldSettings(), PART, number)
+        grid, start, goal = GridMap(world.maps[0]), world.start[0], world.goal[0]
+        (u, v), (x, y) = start.astype(int).tolist(), goal.astype(int).tolist()
+        optimum = float(distances(grid.free, (u, v))[y, x])
+        values = predictor.predict(grid, start, goal).values
+        for planner in MEASURES:
+            options = {"planner": planner, "range": RANGE, "time": TIME, "seed": number}
+            own = measure(plan(grid, start, goal, sampler="uniform", **options), optimum)
+            for power in POWERS:
+                heatmap = Heatmap(values**power, grid)
+                result = plan(grid, start, goal, heatmap=heatmap, **options)
+                ratios[planner][power].append(measure(result, optimum) / own)
+    medians = {
+        planner: {str(power): float(np.median(values)) for power, values in by_power.items()}
+        for planner, by_power in ratios.items()
+    }
+    for planner, by_power in medians.items():
+        print(planner, MEASURES[planner], {power: round(m, 3) for power, m in by_power.items()})
+    if args.json is not None:
+        write_json(args.json, {"ompl": ompl_version(), "maps": args.maps, "median_ratios": medians})
+    if args.plot is not None:
+        draw(medians, args.plot)
+
+
+def measure(result: PlanResult, optimum: float) -> float:
+    """Nodes of RRT; of the others the time until the path is within 5 % of the shortest."""
+    if result.planner == "RRT":
+        return float(result.nodes)
+    times = [time for time, cost in result.progress if cost <= WITHIN * optimum]
+    return times[0] if times else TIME
+
+
+def draw(medians: dict[str, dict[str, float]], path: str) -> None:
+    figure = Figure(figsize=(5.2, 3.4), layout="constrained")
+    axes = figure.subplots()
+    styles: list[dict[str, Any]] = [
+        {"color": "#0072B2", "marker": "o"},
+        {"color": "#D55E00", "marker": "s", "linestyle": "--"},
+        {"color": "#009E73", "marker": "^", "linestyle": ":"},
+    ]
+    for (planner, by_power), style in zip(medians.items(), styles, strict=True):
+        label = f"{planner}, {MEASURES[planner]}"
+        axes.plot(
+            [float(power) for power in by_power], list(by_power.values()), label=label, **style
+        )
+    axes.set_xscale("log", base=2)
+    axes.set(xlabel="power of the heat map", ylabel="ratio to OMPL's own sampler", ylim=(0, 1))
+    axes.set_xticks(POWERS, [f"{power:g}" for power in POWERS])
+    axes.legend(frameon=False, fontsize=8)
+    figure.savefig(path, dpi=120)
+
+
+if __name__ == "__main__":
+    main()
