@@ -97,7 +97,9 @@ def test_planner_draws_from_the_heatmap(
         assert link.hook == reached_planners()[planner]
         status = setup.solve(0.4)
         assert link.draws["learned"] > 20
-        assert link.draws["learned"] > link.draws["uniform"]
+        # STRIDE draws around its nodes, half of which lie where the heat map is 0.
+        least = 0.5 if planner == "STRIDE" else 1.0
+        assert link.draws["learned"] > least * link.draws["uniform"]
         if compat.is_exact(status):
             path = compat.path_positions(setup.getSolutionPath())
             assert two_walls.path_is_free(path)
