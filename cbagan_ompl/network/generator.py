@@ -170,7 +170,7 @@ class Generator(nn.Module):
         features = self.up1(features, of_map + of_points)
         image = torch.tanh(functional.pixel_shuffle(self.head(features), self.patch))
         if self.white_obstacles:
-            image = image.masked_fill(map_image < 0, 1.0)
+            image = image.masked_fill(map_image[:, :1] < 0, 1.0)
         return image
 
 
