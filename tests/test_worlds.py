@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import fields, replace
 from math import hypot, pi
+from multiprocessing import active_children
 from pathlib import Path
 from typing import Any
 
@@ -384,3 +385,12 @@ def test_bad_options_are_told_before_anything_is_drawn(
     with pytest.raises(error, match=message):
         run(*words, "--output", str(tmp_path / "run"))
     assert not (tmp_path / "run").exists()
+
+
+def test_a_drawing_process_that_dies_gives_a_clear_error() -> None:
+    settings = WorldSettings(size=64, families=("blocks",))
+    with world_source(settings, WorldSchedule(maps=2, held_back=1)) as source:
+        for child in active_children():
+            child.kill()
+        with pytest.raises(DatasetError, match="drew worlds has died"):
+            source.epoch(0)

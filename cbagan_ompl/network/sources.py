@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing import get_context
 from typing import Any, Protocol
 
 from ..checks import check_at_least, require
 from ..datasets.layout import Dataset, Tasks
 from ..datasets.worlds import TASKS_PER_MAP, WorldSettings, draw_world, joined_tasks
+from ..errors import DatasetError
+from ..processes import fork_server, interrupts_held
 
 # Numbers of the parts of an endless source; maps of different parts are different maps.
 _TRAINING, _VALIDATION, _TEST = range(3)
@@ -97,21 +98,24 @@ class WorldSource:
         self._pool = pool
         self._ahead: dict[int, list[Future[Tasks]]] = {}
         self.side = settings.size
-        self.validation, self.test = (
-            joined_tasks([future.result() for future in self._submitted(part, 0, count)])
-            for part, count in ((_VALIDATION, schedule.held_back), (_TEST, schedule.held_back))
-        )
+        with _deaths_told():
+            self.validation, self.test = (
+                _drawn(self._submitted(part, 0, schedule.held_back))
+                for part in (_VALIDATION, _TEST)
+            )
 
     def epoch(self, number: int) -> Tasks:
         """New tasks; those of the next epoch are begun."""
-        for n in (number, number + 1):
-            if n not in self._ahead:
-                self._ahead[n] = self._submitted(_TRAINING, n, self._schedule.maps)
-        return joined_tasks([future.result() for future in self._ahead.pop(number)])
+        with _deaths_told():
+            for n in (number, number + 1):
+                if n not in self._ahead:
+                    self._ahead[n] = self._submitted(_TRAINING, n, self._schedule.maps)
+            return _drawn(self._ahead.pop(number))
 
     def _submitted(self, part: int, epoch: int, count: int) -> list[Future[Tasks]]:
         numbers = range(epoch * count, (epoch + 1) * count)
-        return [self._pool.submit(draw_world, self._settings, part, n) for n in numbers]
+        with interrupts_held():  # submitting starts the processes
+            return [self._pool.submit(draw_world, self._settings, part, n) for n in numbers]
 
     def description(self) -> dict[str, Any]:
         """The settings, and how many tasks there are."""
@@ -125,6 +129,22 @@ class WorldSource:
         }
 
 
+def _drawn(worlds: list[Future[Tasks]]) -> Tasks:
+    """The tasks of all worlds, once they are drawn."""
+    return joined_tasks([world.result() for world in worlds])
+
+
+@contextmanager
+def _deaths_told() -> Iterator[None]:
+    """A process that has died gives a clear error, whether work is asked of it or awaited."""
+    try:
+        yield
+    except BrokenProcessPool as error:
+        raise DatasetError(
+            "a process that drew worlds has died, perhaps for lack of memory"
+        ) from error
+
+
 @contextmanager
 def world_source(settings: WorldSettings, schedule: WorldSchedule) -> Iterator[WorldSource]:
     """An endless source of tasks, and its processes until the end of the context.
@@ -135,15 +155,13 @@ def world_source(settings: WorldSettings, schedule: WorldSchedule) -> Iterator[W
 
     Raises:
         MissingDependencyError: numba is not installed.
+        DatasetError: a process has died.
     """
     require("numba", "train")
-    pool = ProcessPoolExecutor(schedule.jobs, get_context("forkserver"), _ignore_interrupts)
+    with interrupts_held():
+        context = fork_server()
+    pool = ProcessPoolExecutor(schedule.jobs, context)
     try:
         yield WorldSource(settings, schedule, pool)
     finally:
         pool.shutdown(cancel_futures=True)
-
-
-def _ignore_interrupts() -> None:
-    """An interrupt from the terminal is for the parent alone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
