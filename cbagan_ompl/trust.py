@@ -191,7 +191,8 @@ class Tree:
         self._covered = np.frombuffer(self.cells, np.uint8).reshape(grid.shape)
         # Quick to within a hundredth, which is near enough here.
         clearance = cv2.distanceTransform(grid.free.view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
-        self._half = np.minimum(clearance, reach / grid.resolution).astype(np.int32)
+        farthest = min(reach / grid.resolution, 2.0**16 - 1)
+        self._half = np.minimum(clearance, farthest).astype(np.uint16)
 
     def add(self, x: float, y: float) -> int | None:
         """Note a node at (x, y), world; the row-major number of its pixel if it is new ground."""
