@@ -146,7 +146,10 @@ class Heatmap:
             start: (x, y), world.
             goal: (x, y), world.
         """
-        first, second = _pixel_pair(self.grid.to_pixel(np.array((start, goal))))
+        ends = np.array((start, goal), dtype=np.float64)
+        if not self.grid.is_free(ends).all():
+            return False
+        first, second = _pixel_pair(self.grid.to_pixel(ends))
         label = int(self.parts[first[1], first[0]])
         return label > 0 and label == int(self.parts[second[1], second[0]])
 

@@ -1,7 +1,7 @@
 """How far a planner's draws follow the heat map: as far as that brings the planner on.
 
 1. Where the region joins start and goal, all draws of the planner are ours. Where it does not, six
-   of seven are left to OMPL's own sampler.
+   of seven are left to OMPL's own sampler, and three of four after 128 draws of the heat map.
 2. Before the first path no draw of the heat map goes where the tree already is. Once the tree has
    filled the region without a path, our draws are uniform.
 3. Before the first path our share halves with every 128 draws of the heat map that bring the tree
@@ -151,9 +151,10 @@ class Trust:
         That is how a tree looks that was cleared meanwhile, so its nodes are counted now and then.
         """
         self._blocked += 1
-        is_power_of_two = self._blocked & (self._blocked - 1) == 0
-        if is_power_of_two and self._count_nodes() < self._tree.nodes / 2:
-            self.restart()
+        if self._blocked > self._tree.nodes:
+            self._blocked = 0
+            if self._count_nodes() < self._tree.nodes / 2:
+                self.restart()
 
     def restart(self) -> None:
         """The tree is empty again."""

@@ -122,6 +122,7 @@ def test_a_cleared_tree_is_noticed(corridor: Heatmap) -> None:
     trust.grown(20.0, 20.0, arrived=False)
     assert any(trust.spent)
     trust.blocked()
+    trust.blocked()
     assert not any(trust.spent)
     again, _ = make_trust(corridor)
     again.grown(20.0, 20.0, arrived=True)
@@ -179,3 +180,23 @@ def test_coverage_saves_nodes(two_walls: GridMap, corridor: Heatmap) -> None:
         return float(np.median([run.nodes for run in runs]))
 
     assert nodes(FULL_ADAPTATION) < 0.75 * nodes(NO_ADAPTATION)
+
+
+@pytest.mark.parametrize("planner", ["RRTstar", "InformedRRTstar"])
+def test_the_simplifier_gets_the_true_goal_where_few_draws_are_ours(planner: str) -> None:
+    free = np.ones((64, 64), bool)
+    free[20:44, 32] = False
+    grid = GridMap(free)
+    values = np.where(np.arange(64) < 45, 0.3, 0.4) * free
+    for seed in range(12):
+        result = plan(
+            grid, (4, 32), (60, 32), planner, heatmap=Heatmap(values, grid), iterations=300,
+            time=20, range=8, simplify=True, seed=seed,
+        )  # fmt: skip
+        assert result.solved, seed
+
+
+def test_points_outside_are_not_joined(corridor: Heatmap) -> None:
+    assert corridor.joins(START, GOAL)
+    assert not corridor.joins(START, (256.0, 5.0))
+    assert not corridor.joins(START, (-3.0, 5.0))

@@ -61,7 +61,7 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
 
     def maxSampleCount(self) -> int:  # noqa: N802
         """No end of samples for the planner, the original's number for anybody else."""
-        return _ENDLESS if self._progress.is_sampling else int(self._original.maxSampleCount())
+        return _ENDLESS if self._progress.is_sampling() else int(self._original.maxSampleCount())
 
     def couldSample(self) -> bool:  # noqa: N802
         """Always, as for the original."""
@@ -70,7 +70,7 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
     def sampleGoal(self, state: Any) -> None:  # noqa: N802
         """A draw for the planner, a sample of the original goal for anybody else."""
         progress = self._progress
-        sampling = progress.is_sampling
+        sampling = progress.is_sampling()
         progress.note_sample()
         if sampling and not self._began:
             self._began = True

@@ -40,22 +40,25 @@ class PlannerProgress:
         self._goal = setup.getGoal()
         self._positions = positions
         self._counts_iterations = hasattr(self._planner, "numIterations")
-        self._last_iteration = 0
+        self._last_iteration = self._asked_iteration = self._paths = 0
         self.share = 1.0
         _alive.add(self)
 
-    @property
     def is_sampling(self) -> bool:
         """Whether the planner's main loop is asking for a goal, rather than OMPL around it.
 
         An informed sampler that is being built, and the path simplifier, ask the goal for samples
-        as well, and must get the goal itself. RRT*-like planners count iterations and ask once in
-        each, from 1 on; the others stop at their first solution.
+        as well, and must get the goal itself. RRT*-like planners count iterations, ask how many
+        samples there are in each, from 1 on, and take at most one; their path is there when their
+        loop has ended. The others stop at their first solution.
         """
         if self._planner is None:
             return False
         if self._counts_iterations:
-            return self._planner.numIterations() not in (0, self._last_iteration)
+            iteration, paths = self._planner.numIterations(), self._problem.getSolutionCount()
+            if iteration != self._asked_iteration:
+                self._asked_iteration, self._paths = iteration, paths
+            return iteration not in (0, self._last_iteration) and paths == self._paths
         # A solution may be older than the tree, after the planner alone was cleared.
         return not (
             self._problem.hasExactSolution() and planner_data(self._planner).numGoalVertices()
