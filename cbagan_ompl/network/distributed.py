@@ -76,6 +76,7 @@ def process_group(device: torch.device) -> Iterator[ProcessGroup]:
     distributed.init_process_group("nccl" if device.type == "cuda" else "gloo")
     try:
         yield ProcessGroup(distributed.get_rank(), distributed.get_world_size())
+        distributed.barrier()  # none leaves while another one still talks to it
     finally:
         distributed.destroy_process_group()
 
