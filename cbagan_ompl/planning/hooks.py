@@ -12,22 +12,18 @@ GOAL_INJECTION = "goal-injection"
 # Planners that make their sampler when they are set up, and keep it for good.
 KEEP_SAMPLER = frozenset({"LazyPRM", "LazyPRMstar"})
 
-# Planners that draw from a StateSampler of the space.
+# Planners that draw from a StateSampler of the space, but for those that sample their goal as well.
 _DRAW_STATES = KEEP_SAMPLER | {
     "BFMT",
     "FMT",
-    "InformedRRTstar",
     "KPIECE1",
     "LBKPIECE1",
     "LBTRRT",
     "LazyRRT",
     "PDST",
-    "RRT",
     "RRTConnect",
     "RRTXstatic",
     "RRTsharp",
-    "RRTstar",
-    "SORRTstar",
     "SST",
     "TRRT",
 }
