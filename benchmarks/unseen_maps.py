@@ -32,8 +32,8 @@ from cbagan_ompl import GridMap, Heatmap, PlanResult, Predictor, load_model, pla
 from cbagan_ompl.benchmarking.selection import BenchmarkTask, select_tasks
 from cbagan_ompl.files import write_json
 from cbagan_ompl.network.config import TrainingConfig
-from cbagan_ompl.network.export import RegionModel
 from cbagan_ompl.network.networks import make_generator
+from cbagan_ompl.network.region_model import RegionModel
 from cbagan_ompl.planning.compat import ompl_version
 
 RANGE, TIME = 20.0, 2.0

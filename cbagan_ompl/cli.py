@@ -179,6 +179,7 @@ def _plan(args: argparse.Namespace) -> int:
         seed=args.seed,
         uniform_fraction=args.uniform_fraction,
         adaptation=Adaptation.of(args.adaptation),
+        sharpness=args.sharpness,
         model=args.model,
         heatmap=None if args.heatmap is None else Heatmap.load(args.heatmap, grid),
         simplify=args.simplify,

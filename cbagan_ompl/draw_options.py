@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .draws import DEFAULT_UNIFORM_FRACTION
+from .draws import DEFAULT_UNIFORM_FRACTION, OPTIMIZING_SHARPNESS
 from .trust import ADAPTATION_PARTS
 
 
@@ -16,6 +16,13 @@ def add_draw_options(parser: Any) -> None:
         default=DEFAULT_UNIFORM_FRACTION,
         metavar="F",
         help=f"share of draws that stays uniform (default: {DEFAULT_UNIFORM_FRACTION})",
+    )
+    parser.add_argument(
+        "--sharpness",
+        type=float,
+        metavar="P",
+        help="power of the heat map that draws follow (default: by planner, "
+        f"{OPTIMIZING_SHARPNESS:g} for those that look for the shortest path, 1 for the others)",
     )
     parser.add_argument(
         "--adaptation",

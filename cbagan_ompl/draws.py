@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import inf, nan
+from math import inf, isfinite, nan
 from random import Random
 from typing import SupportsFloat
 
@@ -18,6 +18,10 @@ from .trust import Trust
 
 #: Share of draws that stays uniform over free space unless the user asks otherwise.
 DEFAULT_UNIFORM_FRACTION = 0.1
+
+#: Power of the heat map that planners draw from which go on to the shortest path: those that stop
+#: at their first path are served best by the heat map as it is.
+OPTIMIZING_SHARPNESS = 3.0
 
 # The first batch is small, because small tasks need few draws; each is twice the one before.
 _FIRST_BATCH, _LARGEST_BATCH = 128, 1024
@@ -69,9 +73,11 @@ class DrawStream:
         heatmap: where to draw.
         uniform_fraction: in (0, 1].
         seed: seed or generator of the draws; the same seed gives the same draws.
+        sharpness: power of the heat map that the density of its draws is proportional to; above 0.
 
     Raises:
-        ConfigError: ``uniform_fraction`` outside (0, 1].
+        ConfigError: ``uniform_fraction`` outside (0, 1], or a ``sharpness`` that is no finite
+            number above 0.
     """
 
     def __init__(
@@ -79,17 +85,22 @@ class DrawStream:
         heatmap: Heatmap,
         uniform_fraction: float = DEFAULT_UNIFORM_FRACTION,
         seed: int | np.random.Generator | None = None,
+        sharpness: float = 1.0,
     ) -> None:
         check_uniform_fraction(uniform_fraction)
+        check_sharpness(sharpness)
         self.heatmap = heatmap
         self.uniform_fraction = float(uniform_fraction)
+        self._sharpness = np.float32(sharpness)
         self.learned = 0
         self.uniform = 0
         self.rng = np.random.default_rng(seed)
         # A generator of single numbers, which NumPy's is slow at.
         self.chance = Random(int(self.rng.integers(2**63))).random
         grid, support = heatmap.grid, heatmap.support
-        self._hot = _Source(grid, support, heatmap.values.ravel()[support], self.rng)
+        hottest = heatmap.values.max()
+        weights = (heatmap.values.ravel()[support] / hottest) ** self._sharpness
+        self._hot = _Source(grid, support, weights, self.rng)
         self._even = _Source(grid, grid.free_pixels, None, self.rng)
         self._best_cost: Callable[[], float] = _no_cost
         self._informed_set: Callable[[], InformedSet | None] = _no_set
@@ -199,7 +210,7 @@ class DrawStream:
             free = grid.is_free(candidates)
             columns, rows = grid.to_pixel(candidates[free]).astype(np.intp).T
             heat = np.zeros(len(candidates))
-            heat[free] = self.heatmap.values[rows, columns]
+            heat[free] = self.heatmap.values[rows, columns] ** self._sharpness
             cumulative = heat.cumsum()
             if cumulative[-1] > 0:
                 threshold = self.chance() * cumulative[-1]
@@ -260,7 +271,8 @@ class _Source:
         self._accepted = 1.0
         self._bounds: NDArray[np.float64] | None = None
         self._pending.clear()
-        self._weigh(inf)
+        if informed is None:
+            self._weigh(inf)
 
     def next(self, best: float, avoid: bytearray | None) -> tuple[float, float] | None:
         """The next draw, (x, y) in world coordinates, where a path cheaper than ``best`` passes.
@@ -340,6 +352,16 @@ def check_uniform_fraction(uniform_fraction: float) -> None:
         )
 
 
+def check_sharpness(sharpness: float) -> None:
+    """Refuse a power that makes no density.
+
+    Raises:
+        ConfigError: not a finite number above 0.
+    """
+    if not (isinstance(sharpness, SupportsFloat) and isfinite(sharpness) and sharpness > 0):
+        raise ConfigError(f"sharpness is a finite number above 0, got {sharpness!r}")
+
+
 def _inside(
     points: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
@@ -347,8 +369,8 @@ def _inside(
 
 
 def _nearest(points: NDArray[np.float64], ends: NDArray[np.float64]) -> NDArray[np.float64]:
-    distances: NDArray[np.float64] = np.linalg.norm(points[:, None] - ends, axis=-1).min(axis=1)
-    return distances
+    distances = [np.hypot(points[:, 0] - x, points[:, 1] - y) for x, y in ends.tolist()]
+    return np.asarray(np.minimum.reduce(distances))
 
 
 def _no_cost() -> float:

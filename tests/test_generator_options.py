@@ -14,9 +14,11 @@ from cbagan_ompl.network.config import TrainingConfig  # noqa: E402
 from cbagan_ompl.network.dataset import check_trainable  # noqa: E402
 from cbagan_ompl.network.discriminators import Discriminator  # noqa: E402
 from cbagan_ompl.network.encoding import map_image, point_image  # noqa: E402
-from cbagan_ompl.network.export import RegionModel, save_script  # noqa: E402
-from cbagan_ompl.network.generator import Generator, _places, stride_of  # noqa: E402
+from cbagan_ompl.network.export import fold_shortcuts, save_script  # noqa: E402
+from cbagan_ompl.network.generator import Generator, places, stride_of  # noqa: E402
 from cbagan_ompl.network.networks import make_generator  # noqa: E402
+from cbagan_ompl.network.patch_model import PatchModel  # noqa: E402
+from cbagan_ompl.network.region_model import ImageModel, RegionModel  # noqa: E402
 
 CONFIG = TrainingConfig(
     widths=(8, 8, 12, 16), stem=12, patch=4, metrics=3, white_obstacles=True, discriminator_width=4
@@ -112,15 +114,53 @@ def test_the_default_options_are_the_papers_generator() -> None:
 
 def test_fronts_begin_where_most_of_a_spot_is() -> None:
     starts, goals = torch.tensor([[13.0, 3.0], [8.0, 20.5]]), torch.tensor([[30.5, 25.2]] * 2)
-    start, goal = _places(point_image(starts, goals, 32, 40), 8)
-    assert start.shape == goal.shape == (2, 1, 4, 5)
-    assert start[0, 0].nonzero().tolist() == [[0, 1]]
+    ends = places(point_image(starts, goals, 32, 40), 8)
+    assert ends.shape == (2, 2, 4, 5)
+    assert ends[0, 0].nonzero().tolist() == [[0, 1]]
     # Half of it on either side of a border.
-    assert start[1, 0].nonzero().tolist() == [[2, 0], [2, 1]]
-    assert goal[:, 0].nonzero().tolist() == [[0, 3, 3], [1, 3, 3]]
+    assert ends[1, 0].nonzero().tolist() == [[2, 0], [2, 1]]
+    assert ends[:, 1].nonzero().tolist() == [[0, 3, 3], [1, 3, 3]]
 
 
-def test_discriminators_see_patches_as_places() -> None:
+@pytest.mark.parametrize("white_obstacles", [True, False])
+@pytest.mark.parametrize("patch", [2, 4])
+@pytest.mark.parametrize(
+    ("start", "goal"),
+    [
+        ((70.3, 20.9), (5.2, 60.9)),
+        ((0.1, 0.1), (127.9, 63.9)),
+        ((30.0, 40.6), (32.9, 42.1)),  # the spots overlap
+        ((29.4, 31.7), (44.8, 31.7)),  # each in the window of the other
+        ((63.5, 0.5), (63.5, 63.5)),
+    ],
+)
+def test_without_the_images_the_result_is_the_same(
+    start: tuple[float, float], goal: tuple[float, float], patch: int, white_obstacles: bool
+) -> None:
+    model = generator(patch=patch, white_obstacles=white_obstacles)
+    with torch.no_grad():
+        model.head.weight.mul_(20)  # so that the result is not one half everywhere
+        free, points = clutter(2, 1, 64, 128), torch.tensor([start, goal])
+        ends = points[:1].expand(2, 2), points[1:].expand(2, 2)
+        lean, full = PatchModel(model)(free, *ends), ImageModel(model)(free, *ends)
+    assert full.std() > 0.1
+    torch.testing.assert_close(lean, full, rtol=0, atol=1e-5)
+
+
+def test_a_folded_shortcut_is_the_same_convolution() -> None:
+    model = generator()
+    inputs = images(clutter(1, 1, 64, 64))
+    with torch.no_grad():
+        for module in model.modules():
+            if isinstance(module, torch.nn.BatchNorm2d):
+                module.running_mean.uniform_(-1, 1)
+                module.running_var.uniform_(0.5, 2)
+        expected = model(*inputs)
+        fold_shortcuts(model)
+        torch.testing.assert_close(model(*inputs), expected, rtol=0, atol=1e-5)
+
+
+def test_discriminators_see_patches_asplaces() -> None:
     inputs = torch.zeros(2, 3, 64, 64)
     logits = Discriminator(4, patch=4)(inputs, inputs)
     assert logits.shape == Discriminator(4)(inputs[..., :16, :16], inputs[..., :16, :16]).shape

@@ -20,12 +20,7 @@ from cbagan_ompl.datasets.layout import load_dataset  # noqa: E402
 from cbagan_ompl.network import model_files  # noqa: E402
 from cbagan_ompl.network.checkpoints import best_generator, load_checkpoint  # noqa: E402
 from cbagan_ompl.network.config import NETWORKS, TrainingConfig  # noqa: E402
-from cbagan_ompl.network.export import (  # noqa: E402
-    RegionModel,
-    export,
-    model_card,
-    save_script,
-)
+from cbagan_ompl.network.export import export, model_card, save_script  # noqa: E402
 from cbagan_ompl.network.networks import make_generator  # noqa: E402
 from cbagan_ompl.network.predictor import (  # noqa: E402
     Predictor,
@@ -33,6 +28,7 @@ from cbagan_ompl.network.predictor import (  # noqa: E402
     scaled_free,
     scaled_shape,
 )
+from cbagan_ompl.network.region_model import RegionModel  # noqa: E402
 from cbagan_ompl.network.sources import DatasetSource  # noqa: E402
 from cbagan_ompl.network.training import train  # noqa: E402
 

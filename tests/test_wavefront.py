@@ -112,31 +112,31 @@ def test_the_gradient_of_a_distance_is_its_cheapest_way(
     torch.testing.assert_close(edges.grad, expected)
 
 
-def inputs() -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+def inputs() -> tuple[torch.Tensor, torch.Tensor]:
     generator = torch.Generator().manual_seed(0)
-    start, goal = torch.zeros(2, BATCH, 1, H, W)
-    start[0, 0, 2, 1] = start[1, 0, 0, 0] = goal[0, 0, 8, 6] = goal[1, 0, 5, 5] = 1
-    return torch.randn(BATCH, 8, H, W, generator=generator), start, goal
+    ends = torch.zeros(BATCH, 2, H, W)
+    ends[0, 0, 2, 1] = ends[1, 0, 0, 0] = ends[0, 1, 8, 6] = ends[1, 1, 5, 5] = 1
+    return torch.randn(BATCH, 8, H, W, generator=generator), ends
 
 
 def test_features_are_one_on_the_cheapest_way_and_less_elsewhere() -> None:
     torch.manual_seed(0)
-    module, (features, start, goal) = Wavefront(8, METRICS).eval(), inputs()
-    fronts = module(features, start, goal)
+    module, (features, ends) = Wavefront(8, METRICS).eval(), inputs()
+    fronts = module(features, ends)
     assert fronts.shape == (BATCH, 2 * METRICS, H, W)
     assert fronts.min() >= 0
     torch.testing.assert_close(fronts.amax((2, 3)), torch.ones(BATCH, 2 * METRICS))
     sharp, wide = fronts.chunk(2, 1)
     assert (sharp <= wide).all()
-    for place in (start, goal):
+    for place in ends.split(1, 1):
         at = fronts.masked_select(place.bool().expand_as(fronts))
         torch.testing.assert_close(at, torch.ones_like(at), rtol=0, atol=1e-4)
 
 
 def test_training_has_the_same_features_with_gradients() -> None:
     torch.manual_seed(0)
-    module, (features, start, goal) = Wavefront(8, METRICS), inputs()
-    trained, used = module.train()(features, start, goal), module.eval()(features, start, goal)
+    module, (features, ends) = Wavefront(8, METRICS), inputs()
+    trained, used = module.train()(features, ends), module.eval()(features, ends)
     torch.testing.assert_close(trained, used, rtol=0, atol=1e-4)
     assert not used.requires_grad
     (trained * torch.rand_like(trained)).sum().backward()
@@ -152,12 +152,12 @@ def test_scripted_fronts_are_the_same(size: tuple[int, int]) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)
         scripted = torch.jit.script(module)
-    features, ends = torch.randn(BATCH, 8, *size), torch.zeros(2, BATCH, 1, *size)
-    ends[0, :, 0, 1, 2] = ends[1, :, 0, 7, 5] = 1
+    features, ends = torch.randn(BATCH, 8, *size), torch.zeros(BATCH, 2, *size)
+    ends[:, 0, 1, 2] = ends[:, 1, 7, 5] = 1
     for model in (module, scripted):
         model.eval()
     with torch.inference_mode():
-        torch.testing.assert_close(scripted(features, *ends), module(features, *ends))
+        torch.testing.assert_close(scripted(features, ends), module(features, ends))
     for model in (module, scripted):
         model.train()
-    torch.testing.assert_close(scripted(features, *ends), module(features, *ends))
+    torch.testing.assert_close(scripted(features, ends), module(features, ends))

@@ -193,6 +193,7 @@ def _benchmark(args: argparse.Namespace) -> int:
         parameters=parse_parameters(args.set),
         uniform_fraction=args.uniform_fraction,
         adaptation=args.adaptation,
+        sharpness=args.sharpness,
         models=models,
         heatmap_dirs=folders,
         radius=args.radius,

@@ -12,7 +12,7 @@ from typing import Any
 import yaml
 
 from ..checks import check_at_least
-from ..draws import DEFAULT_UNIFORM_FRACTION
+from ..draws import DEFAULT_UNIFORM_FRACTION, check_sharpness, check_uniform_fraction
 from ..errors import ConfigError
 from ..trust import ADAPTATION_PARTS, Adaptation
 
@@ -39,6 +39,8 @@ class Settings:
         uniform_fraction: share of draws that stays uniform over free space, in (0, 1].
         adaptation: names of the parts of the adaptation that are on, see
             :mod:`cbagan_ompl.trust`.
+        sharpness: power of the heat maps that draws follow; by default what suits each planner,
+            see :func:`cbagan_ompl.attach`.
         models: for some samplers the file of the model that they draw from; the bundled one for
             ``learned`` by default.
         heatmap_dirs: for some samplers the folder of their heat maps, one for each task.
@@ -57,6 +59,7 @@ class Settings:
     parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     uniform_fraction: float = DEFAULT_UNIFORM_FRACTION
     adaptation: tuple[str, ...] = ADAPTATION_PARTS
+    sharpness: float | None = None
     models: Mapping[str, str] = field(default_factory=dict)
     heatmap_dirs: Mapping[str, str] = field(default_factory=dict)
     radius: float = 0.0
@@ -70,10 +73,9 @@ class Settings:
         for name, value in (("time", self.time), ("range", self.range)):
             if value is not None and not (isfinite(value) and value > 0):
                 raise ConfigError(f"{name} must be above 0, got {value}")
-        if not 0 < self.uniform_fraction <= 1:
-            raise ConfigError(
-                f"uniform_fraction is a share above 0 and up to 1, got {self.uniform_fraction}"
-            )
+        check_uniform_fraction(self.uniform_fraction)
+        if self.sharpness is not None:
+            check_sharpness(self.sharpness)
         Adaptation.of(self.adaptation)
         check_at_least("seed", self.seed, 0)
         for planner in self.parameters:

@@ -87,6 +87,7 @@ def _options(job: Job) -> RunOptions:
         tolerance=job.task.grid.resolution,
         uniform_fraction=settings.uniform_fraction,
         adaptation=Adaptation.of(settings.adaptation),
+        sharpness=settings.sharpness,
         seed=(settings.seed + crc32(job.task.name.encode())) % 2**32,
     )
 

@@ -10,14 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from torch import Tensor, nn
-from torch.nn import functional
+from torch import nn
 
 from ..errors import ModelError
 from .checkpoints import best_generator, load_checkpoint
-from .encoding import map_image, point_image, region_probability
-from .generator import Generator, ResidualBlock, stride_of
+from .generator import Generator, ResidualBlock
 from .model_files import MANIFEST, RECORD_NAME, RECORD_SCHEMA, read_manifest, sha256
+from .region_model import RegionModel
 
 INPUTS = (
     "free: float (B, 1, H, W) in [0, 1], 1 where free, any H and W; "
@@ -25,36 +24,6 @@ INPUTS = (
     "corner, the centre of the upper left pixel is (0.5, 0.5)"
 )
 OUTPUTS = "float (B, 1, H, W) in [0, 1]: probability that a pixel belongs to the promising region"
-
-
-class RegionModel(nn.Module):
-    """What the exported file holds: encoding, generator and decoding in one module.
-
-    Args:
-        generator: with its trained weights.
-    """
-
-    def __init__(self, generator: Generator) -> None:
-        super().__init__()
-        self.generator = generator
-        self.stride = stride_of(generator.patch)
-
-    def forward(self, free: Tensor, start: Tensor, goal: Tensor) -> Tensor:
-        """Probability of the region, (B, 1, H, W) in [0, 1], for any height and width.
-
-        The noise is 0, the centre of what training drew, so that equal inputs give equal outputs.
-
-        Args:
-            free: (B, 1, H, W) in [0, 1], 1 where free.
-            start: (B, 2), pixel coordinates (u, v).
-            goal: (B, 2), the same.
-        """
-        height, width = free.size(2), free.size(3)
-        # Blocked pixels to the right and below fill up to the strides and are cut off again.
-        padded = functional.pad(free, [0, -width % self.stride, 0, -height % self.stride])
-        points = point_image(start, goal, padded.size(2), padded.size(3))
-        image = self.generator(map_image(padded), points, torch.zeros_like(padded))
-        return region_probability(image)[:, :, :height, :width].clamp(0.0, 1.0)
 
 
 def export(
@@ -82,14 +51,15 @@ def export(
     if target.suffix != ".pt":
         raise ModelError(f"{target}: the name of an exported model ends in .pt")
     state = load_checkpoint(checkpoint)
-    model = RegionModel(best_generator(state)).eval()
-    record = make_record(target.stem, state, model, note)
+    generator = best_generator(state)
+    record = make_record(target.stem, state, generator, note)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         target.touch()
     except OSError as error:
         raise ModelError(f"cannot write {target}: {error.strerror or error}") from error
-    fold_shortcuts(model)
+    fold_shortcuts(generator)
+    model = RegionModel(generator).eval()
     # Convolutions in this layout take four fifths of the time on a CPU.
     model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     save_script(model, target, record)
@@ -138,14 +108,14 @@ def _folded(pool: nn.AvgPool2d, conv: nn.Conv2d, norm: nn.BatchNorm2d) -> nn.Con
 
 
 def make_record(
-    name: str, state: dict[str, Any], model: nn.Module, note: str = ""
+    name: str, state: dict[str, Any], generator: Generator, note: str = ""
 ) -> dict[str, Any]:
     """What a model file says about itself.
 
     Args:
         name: of the model.
         state: the training checkpoint.
-        model: the module, to count its parameters.
+        generator: to count its parameters.
         note: see :func:`export`.
     """
     last = state["history"][-1]
@@ -155,7 +125,7 @@ def make_record(
         "inputs": INPUTS,
         "outputs": OUTPUTS,
         "working_size": state["dataset"]["side"],
-        "parameters": sum(parameter.numel() for parameter in model.parameters()),
+        "parameters": sum(parameter.numel() for parameter in generator.parameters()),
         "recipe": state["config"],
         "epoch": last["epoch"],
         "dataset": state["dataset"],

@@ -154,9 +154,29 @@ class Generator(nn.Module):
         Returns:
             (B, 3, H, W); H and W must be multiples of :func:`stride_of` the patch.
         """
-        of_map = torch.relu(self.map_stem(map_image))
-        of_points = torch.relu(self.point_stem(point_image))
-        of_noise = torch.relu(self.noise_stem(noise))
+        features = self.features(
+            torch.relu(self.map_stem(map_image)),
+            torch.relu(self.point_stem(point_image)),
+            torch.relu(self.noise_stem(noise)),
+            places(point_image, 2 * self.patch),
+        )
+        image = torch.tanh(functional.pixel_shuffle(self.head(features), self.patch))
+        if self.white_obstacles:
+            image = image.masked_fill(map_image[:, :1] < 0, 1.0)
+        return image
+
+    def features(self, of_map: Tensor, of_points: Tensor, of_noise: Tensor, ends: Tensor) -> Tensor:
+        """All between the stems and the last layer.
+
+        Args:
+            of_map: (B, stem, h, w), what the stem makes of the map.
+            of_points: the same of the points.
+            of_noise: (B, noise_stem, h, w).
+            ends: (B, 2, h / 2, w / 2), see :func:`places`.
+
+        Returns:
+            (B, stem, h, w).
+        """
         half = self.down1(torch.cat((of_map, of_points, of_noise), 1))
         quarter = self.down2(half)
         eighth = self.down3(quarter)
@@ -164,14 +184,10 @@ class Generator(nn.Module):
         features = self.up3(features, quarter)
         features = self.up2(features, half)
         if self.wavefront is not None and self.fuse is not None:
-            start, goal = _places(point_image, 2 * self.patch)
-            fronts = self.wavefront(features, start, goal)
+            fronts = self.wavefront(features, ends)
             features = self.fuse(torch.cat((features, fronts.to(features.dtype)), 1))
-        features = self.up1(features, of_map + of_points)
-        image = torch.tanh(functional.pixel_shuffle(self.head(features), self.patch))
-        if self.white_obstacles:
-            image = image.masked_fill(map_image[:, :1] < 0, 1.0)
-        return image
+        painted: Tensor = self.up1(features, of_map + of_points)
+        return painted
 
 
 def stride_of(patch: int) -> int:
@@ -185,7 +201,7 @@ def _stem(channels: int, width: int, patch: int) -> nn.Conv2d:
     return nn.Conv2d(channels, width, patch, stride=patch)
 
 
-def _places(point_image: Tensor, size: int) -> tuple[Tensor, Tensor]:
+def places(point_image: Tensor, size: int) -> Tensor:
     """The place of the start and that of the goal, for places of ``size`` x ``size`` pixels.
 
     Args:
@@ -193,10 +209,9 @@ def _places(point_image: Tensor, size: int) -> tuple[Tensor, Tensor]:
         size: of a place.
 
     Returns:
-        Two tensors (B, 1, H / size, W / size), 1 where most of the spot is, 0 elsewhere.
+        (B, 2, H / size, W / size), 1 where most of the spot of the start is, and of the goal.
     """
     height, width = point_image.size(2) // size, point_image.size(3) // size
     tiles = point_image[:, ::2].reshape(-1, 2, height, size, width * size).sum(3)
     brightness = tiles.reshape(-1, 2, height, width, size).sum(4)
-    darkest = (brightness <= brightness.amin((2, 3), keepdim=True)).float()
-    return darkest[:, 0:1], darkest[:, 1:2]
+    return (brightness <= brightness.amin((2, 3), keepdim=True)).float()

@@ -33,23 +33,22 @@ class Wavefront(nn.Module):
         self.costs = nn.Conv2d(channels, 4 * metrics, 1)
         self.steps = steps
 
-    def forward(self, features: Tensor, start: Tensor, goal: Tensor) -> Tensor:
+    def forward(self, features: Tensor, ends: Tensor) -> Tensor:
         """Two features a metric: closeness to the best way, sharp and wide.
 
         Args:
             features: (B, channels, H, W).
-            start: (B, 1, H, W), positive where the front of the start begins.
-            goal: (B, 1, H, W), the same of the goal.
+            ends: (B, 2, H, W), positive where the front of the start begins, and of the goal.
 
         Returns:
             (B, 2 C, H, W) in [0, 1]; 1 on the cheapest ways.
         """
         edges = self.costs(features).float().clamp(-3.0, 6.0).exp()
-        ends = torch.cat((start, goal), 1).permute(2, 3, 0, 1) > 0
-        height, width, batch = ends.size(0), ends.size(1), ends.size(2)
+        sources = ends.permute(2, 3, 0, 1) > 0
+        height, width, batch = sources.size(0), sources.size(1), sources.size(2)
         # Both fronts at once, places first: every operation works on long rows.
         costs = step_costs(edges.permute(2, 3, 0, 1)).unsqueeze(4).expand(-1, -1, -1, -1, 2, -1)
-        source = ends.unsqueeze(4).expand(-1, -1, -1, -1, costs.size(5))
+        source = sources.unsqueeze(4).expand(-1, -1, -1, -1, costs.size(5))
         shape = [height, width, batch, 2, costs.size(5)]
         costs, source = costs.flatten(3), source.flatten(2)
         distance = spread(costs.detach(), source, self.steps)
@@ -122,7 +121,7 @@ def spread(costs: Tensor, source: Tensor, steps: int) -> Tensor:
             for i in range(8):
                 torch.add(views[i], of_step[i], out=reached)
                 torch.minimum(here, reached, out=here)
-            if step % 8 == 7:
+            if step % 4 == 3:
                 if torch.equal(here, before):
                     break
                 before.copy_(here)

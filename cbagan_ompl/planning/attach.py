@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..draws import DEFAULT_UNIFORM_FRACTION, DrawStream
+from ..draws import DEFAULT_UNIFORM_FRACTION, OPTIMIZING_SHARPNESS, DrawStream
 from ..errors import PlannerError
 from ..heatmap import Heatmap
 from ..trust import FULL_ADAPTATION, Adaptation, Trust
@@ -20,6 +20,7 @@ from .hooks import (
     GOAL_INJECTION,
     KEEP_SAMPLER,
     STATE_SAMPLER,
+    STOP_AT_FIRST,
     VALID_STATE_SAMPLER,
     hook_of,
 )
@@ -77,6 +78,7 @@ def attach(
     uniform_fraction: float = DEFAULT_UNIFORM_FRACTION,
     seed: int | np.random.Generator | None = None,
     adaptation: Adaptation = FULL_ADAPTATION,
+    sharpness: float | None = None,
 ) -> Attachment:
     """Make the planner of a SimpleSetup draw from a heat map.
 
@@ -94,6 +96,9 @@ def attach(
         seed: seed or generator of the draws; seed OMPL as well for repeatable plans.
         adaptation: how the share of the heat map changes while the planner plans, see
             :mod:`cbagan_ompl.trust`; for planners that goal injection reaches.
+        sharpness: power of the heat map that the density of the draws is proportional to. By
+            default 1 for planners that stop at their first path, and
+            :data:`cbagan_ompl.draws.OPTIMIZING_SHARPNESS` for those that go on.
 
     Returns:
         A handle with ``.hook``, ``.draws`` and ``.detach()``.
@@ -103,13 +108,16 @@ def attach(
             map already, its space has no (x, y), the start or goal is missing, or the goal
             cannot be sampled.
         HeatmapError: the heat map is 0 everywhere in the bounds of the space.
-        ConfigError: ``uniform_fraction`` outside (0, 1].
+        ConfigError: ``uniform_fraction`` outside (0, 1], or a ``sharpness`` that is no finite
+            number above 0.
     """
     planner = setup.getPlanner()
     _check_attachable(setup, planner)
     name = _class_name(planner)
     hook = hook_of(name)
-    stream = DrawStream(heatmap, uniform_fraction, seed)
+    if sharpness is None:
+        sharpness = 1.0 if name in STOP_AT_FIRST else OPTIMIZING_SHARPNESS
+    stream = DrawStream(heatmap, uniform_fraction, seed, sharpness)
     space = setup.getStateSpace()
     positions = positions_of(space, stream.rng)
     stream.keep_inside(*bounds_of(space))

@@ -103,6 +103,7 @@ class RunOptions:
         tolerance: how far from the goal a path may end, world units.
         uniform_fraction: share of draws that stays uniform over free space, in (0, 1].
         adaptation: how the share of a heat map changes meanwhile, see :mod:`cbagan_ompl.trust`.
+        sharpness: power of a heat map that draws follow; what suits each planner for None.
         seed: at least 0; of OMPL's generators and of the draws.
     """
 
@@ -112,6 +113,7 @@ class RunOptions:
     tolerance: float = 0.0
     uniform_fraction: float = DEFAULT_UNIFORM_FRACTION
     adaptation: Adaptation = FULL_ADAPTATION
+    sharpness: float | None = None
     seed: int = 0
 
 
@@ -249,6 +251,7 @@ class _Contest:
                 self._options.uniform_fraction,
                 self._rng,
                 self._options.adaptation,
+                self._options.sharpness,
             )
             self._inference_s = made_in + perf_counter() - began
         self._motions.begin_run(instance)

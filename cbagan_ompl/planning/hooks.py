@@ -48,6 +48,29 @@ _DRAW_VALID_STATES = frozenset(
 # the goal about every node of their tree as well, so that draws can follow what the tree does.
 _SAMPLE_GOAL = frozenset({"InformedRRTstar", "RRT", "RRTstar", "SORRTstar"})
 
+#: Planners whose solve ends with the first solution.
+STOP_AT_FIRST = frozenset(
+    {
+        "BFMT",
+        "BKPIECE1",
+        "BiEST",
+        "EST",
+        "FMT",
+        "KPIECE1",
+        "LBKPIECE1",
+        "LazyPRM",
+        "LazyRRT",
+        "PDST",
+        "PRM",
+        "ProjEST",
+        "RRT",
+        "RRTConnect",
+        "SBL",
+        "STRIDE",
+        "TRRT",
+    }
+)
+
 
 def hook_of(planner: str) -> str:
     """Name of the hook that reaches a planner on the installed OMPL.

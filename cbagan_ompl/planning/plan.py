@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..draws import DEFAULT_UNIFORM_FRACTION, check_uniform_fraction
+from ..draws import DEFAULT_UNIFORM_FRACTION, check_sharpness, check_uniform_fraction
 from ..errors import ConfigError
 from ..gridmap import GridMap
 from ..heatmap import Heatmap
@@ -22,7 +22,7 @@ from ..trust import FULL_ADAPTATION, Adaptation
 from . import compat
 from .attach import attach
 from .compat import ou
-from .hooks import hook_of
+from .hooks import STOP_AT_FIRST, hook_of
 from .problem import checked_path, path_length, set_range, simple_setup
 from .progress import CostHistory
 
@@ -31,29 +31,6 @@ if TYPE_CHECKING:
 
 #: Where the heat map of a plan can come from; "uniform" is OMPL's own sampler, untouched.
 SAMPLERS = ("learned", "uniform", "corridor", "straight-line")
-
-# Planners whose solve ends with the first solution.
-_STOP_AT_FIRST = frozenset(
-    {
-        "BFMT",
-        "BKPIECE1",
-        "BiEST",
-        "EST",
-        "FMT",
-        "KPIECE1",
-        "LBKPIECE1",
-        "LazyPRM",
-        "LazyRRT",
-        "PDST",
-        "PRM",
-        "ProjEST",
-        "RRT",
-        "RRTConnect",
-        "SBL",
-        "STRIDE",
-        "TRRT",
-    }
-)
 
 #: What a result names its sampler when the caller brought the heat map.
 OWN_HEATMAP = "heatmap"
@@ -148,6 +125,7 @@ def plan(
     goal_tolerance: float | None = None,
     keep_tree: bool = False,
     adaptation: Adaptation = FULL_ADAPTATION,
+    sharpness: float | None = None,
 ) -> PlanResult:
     """Plan a path on a map with one of OMPL's planners, unmodified.
 
@@ -177,6 +155,8 @@ def plan(
         keep_tree: put the edges of the planner's tree into the result.
         adaptation: how the share of the heat map changes while the planner plans, see
             :mod:`cbagan_ompl.trust`.
+        sharpness: power of the heat map that draws follow; by default what suits the planner, see
+            :func:`attach`.
 
     Returns:
         The result; not finding a path in time is no error, ``solved`` is False then.
@@ -200,6 +180,8 @@ def plan(
     count_limit = None if iterations is None else _whole("iterations", iterations, 1)
     used_seed = secrets.randbits(32) if seed is None else _whole("seed", seed, 0)
     check_uniform_fraction(uniform_fraction)
+    if sharpness is not None:
+        check_sharpness(sharpness)
     kind = compat.planner_class(planner)
     if sampler != "uniform":
         hook_of(planner)
@@ -216,7 +198,7 @@ def plan(
         drawn_from = provide(space_map, *task) if provide is not None else None
         link = None
         if drawn_from is not None:
-            link = attach(setup, drawn_from, uniform_fraction, used_seed, adaptation)
+            link = attach(setup, drawn_from, uniform_fraction, used_seed, adaptation, sharpness)
         inference_s = perf_counter() - began if link else 0.0
         try:
             run = _solve(setup, planner, time_limit, count_limit)
@@ -347,7 +329,7 @@ def _solve(setup: Any, name: str, time: float, iterations: int | None) -> _Run:
     status = setup.solve(condition)
     planning_s = perf_counter() - began
     progress = np.array(watch.history.costs if watch else []).reshape(-1, 2)
-    first = planning_s if name in _STOP_AT_FIRST else None
+    first = planning_s if name in STOP_AT_FIRST else None
     return _Run(
         exact=compat.is_exact(status),
         status=str(status),
