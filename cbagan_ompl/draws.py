@@ -132,17 +132,19 @@ class DrawStream:
             self._even.keep_inside(low, high)
 
     def follow(
-        self, best_cost: Callable[[], float], informed_set: Callable[[], InformedSet | None]
+        self,
+        best_cost: Callable[[], float],
+        informed_set: Callable[[], InformedSet | None] | None = None,
     ) -> None:
         """Draw only where a path cheaper than the best known one can pass.
 
         Args:
             best_cost: called at every draw; the cost of the best known path, infinite before it.
             informed_set: called once a solution is known; the set, by start and goal, or None to
-                draw everywhere.
+                draw everywhere, as without this function.
         """
         self._best_cost = best_cost
-        self._informed_set = informed_set
+        self._informed_set = informed_set or _no_set
 
     def prepare(self) -> None:
         """Make the first draws now, rather than when the first one is asked for."""
@@ -297,6 +299,8 @@ class _Source:
             self._refill(best)
         # Nothing of the map is in the informed set: any draw is as good as another.
         x, y, _, _ = self._pending.pop()
+        if self._box is not None:
+            x, y = np.clip((x, y), *self._box).tolist()
         return x, y
 
     def prepare(self) -> None:

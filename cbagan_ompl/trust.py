@@ -1,7 +1,7 @@
 """How far a planner's draws follow the heat map: as far as that brings the planner on.
 
 1. Where the region joins start and goal, all draws of the planner are ours. Where it does not, six
-   of seven are left to OMPL's own sampler, and three of four after 128 draws of the heat map.
+   of seven are left to OMPL's own sampler.
 2. Before the first path no draw of the heat map goes where the tree already is. Once the tree has
    filled the region without a path, our draws are uniform.
 3. Before the first path our share halves with every 128 draws of the heat map that bring the tree
@@ -108,7 +108,8 @@ class Trust:
         self._share = self._most = 1.0
         self._vain = self._blocked = 0
         self._arrived = False
-        self._is_followed = True
+        # Whether the tree is followed before the first path, and whether it is at the moment.
+        self._follows = self._is_followed = adaptation.coverage or adaptation.patience
 
     def begin(self, joined: bool) -> None:
         """The planner has begun to plan.
@@ -120,7 +121,8 @@ class Trust:
             self._most = _DOUBTED
             self._follow(_DOUBTED)
             # For so few draws it does not pay to follow the tree.
-            self._is_followed, self.spent = False, None
+            self._follows = self._is_followed = False
+            self.spent = None
 
     def grown(self, x: float, y: float, arrived: bool) -> None:
         """The tree has a new node at (x, y), world; ``arrived`` when it is in the goal."""
@@ -136,12 +138,15 @@ class Trust:
 
     def improved(self) -> None:
         """There is a first path, or a better one."""
+        self._is_followed = False
         self._follow(self._most)
 
     def drawn(self) -> None:
         """A draw of the heat map is made before the first path."""
+        if not (self._is_followed and self._adaptation.patience):
+            return
         self._vain += 1
-        if self._vain >= _HALF_LIFE and self._adaptation.patience:
+        if self._vain >= _HALF_LIFE:
             self._vain = 0
             self._follow(max(self._share / 2, _LEAST))
 
@@ -160,6 +165,7 @@ class Trust:
         """The tree is empty again."""
         self._vain = self._blocked = 0
         self._arrived = False
+        self._is_followed = self._follows
         self._tree.clear()
         self._follow(self._most)
 

@@ -61,6 +61,11 @@ def add_train_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--resume", action="store_true", help="go on from last.pt in the output folder"
     )
+    parser.add_argument(
+        "--start-from",
+        metavar="FILE",
+        help="begin with the weights of another run's checkpoint, which this one refines",
+    )
     recipe = parser.add_argument_group("recipe, the later overrides the earlier")
     recipe.add_argument(
         "--preset",
@@ -193,6 +198,7 @@ def _train(args: argparse.Namespace) -> int:
                 config,
                 args.output,
                 resume=args.resume,
+                start_from=args.start_from,
                 device=args.device,
                 tensorboard=args.tensorboard,
             )

@@ -1,4 +1,4 @@
-"""The training recipe: one frozen record of every choice, with two named presets."""
+"""The training recipe: one frozen record of every choice, with named presets."""
 
 from __future__ import annotations
 
@@ -56,6 +56,8 @@ class TrainingConfig:
         positive_weight: factor of the region's part of the binary cross-entropy; above 1 a missed
             place costs more than one too many.
         white_obstacles: the generator paints obstacles white, and learns about free space alone.
+        scales: each batch is scaled down by one of these factors at random, so that the networks
+            learn to see coarse maps as well.
         symmetries: turn and mirror each task at random (8 symmetries of the square).
         reversal: exchange start and goal at random. Only for regions that do not depend on which
             is which: those of the paper's data set grew from one end, and there it costs
@@ -99,6 +101,7 @@ class TrainingConfig:
     dice_smooth: float = 1.0
     positive_weight: float = 1.0
     white_obstacles: bool = False
+    scales: tuple[int, ...] = (1,)
     symmetries: bool = True
     reversal: bool = False
     ema_decay: float = 0.998
@@ -136,6 +139,7 @@ class TrainingConfig:
             ):
                 self._check(field.name, getattr(self, field.name) >= 0, "at least 0")
         self._check("seed", self.seed < 2**63, "below 2**63")
+        self._check("scales", len(self.scales) > 0 and min(self.scales) >= 1, "at least 1")
 
     def _check_widths(self) -> None:
         if len(self.widths) != 4 or min(self.widths) < 1:

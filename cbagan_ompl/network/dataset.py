@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import lcm
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
+from torch.nn import functional
 
 from ..datasets.layout import Tasks
 from ..errors import DatasetError
@@ -23,9 +25,9 @@ def check_trainable(side: int, config: TrainingConfig) -> None:
         config: the recipe.
 
     Raises:
-        DatasetError: it is no multiple of the networks' strides.
+        DatasetError: it is no multiple of the networks' strides, at every scale of the recipe.
     """
-    stride = stride_of(config.patch)
+    stride = stride_of(config.patch) * lcm(*config.scales)
     if side % stride:
         raise DatasetError(
             f"the networks take images with a side that is a multiple of {stride} pixels; these "
@@ -85,6 +87,23 @@ def make_batch(
         torch.from_numpy(ends[:, 0].copy()).to(device),
         torch.from_numpy(ends[:, 1].copy()).to(device),
         torch.from_numpy(region).to(device).unsqueeze(1).float(),
+    )
+
+
+def scaled_down(batch: Batch, factor: int) -> Batch:
+    """The tasks on smaller maps: a pixel is free, or in the region, when any of its block is.
+
+    Args:
+        batch: with sides that are multiples of the factor.
+        factor: at least 1.
+    """
+    if factor == 1:
+        return batch
+    return Batch(
+        functional.max_pool2d(batch.free, factor),
+        batch.start / factor,
+        batch.goal / factor,
+        functional.max_pool2d(batch.region, factor),
     )
 
 

@@ -120,6 +120,24 @@ class Networks:
         for name, optimizer in self.optimizers.items():
             optimizer.load_state_dict(state["optimizers"][name])
 
+    def start_from(self, state: dict[str, Any]) -> None:
+        """Begin with the weights of another run, the generator with its average there.
+
+        Args:
+            state: what :meth:`state_dict` of the other run gave.
+
+        Raises:
+            ConfigError: they belong to other networks.
+        """
+        try:
+            for name in self._modules:
+                weights = state["average" if name == "generator" else name]
+                getattr(self, name).load_state_dict(weights)
+        except RuntimeError as error:
+            raise ConfigError(
+                "the run to start from has other networks: give its options of them"
+            ) from error
+
     _modules = ("generator", "map_discriminator", "point_discriminator", "average")
 
 

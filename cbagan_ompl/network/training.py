@@ -19,7 +19,7 @@ from ..datasets.layout import Tasks
 from ..errors import ConfigError
 from .checkpoints import BEST, LAST, SCHEMA, best_generator, load_checkpoint, save_atomically
 from .config import TrainingConfig
-from .dataset import Batch, check_trainable, make_batch
+from .dataset import Batch, check_trainable, make_batch, scaled_down
 from .distributed import ProcessGroup, process_group
 from .evaluation import evaluate, trivial_scores
 from .networks import Networks, encode, pick_device
@@ -70,6 +70,7 @@ def train(
     output: str | PathLike[str],
     *,
     resume: bool = False,
+    start_from: str | PathLike[str] | None = None,
     device: str = "auto",
     progress: bool = True,
     tensorboard: bool = False,
@@ -88,6 +89,8 @@ def train(
         config: the recipe.
         output: the folder for the files, made if missing.
         resume: go on from ``last.pt`` in that folder; without it the folder must hold none.
+        start_from: checkpoint of another run of the same networks, whose weights this one begins
+            with.
         device: ``auto`` (a GPU if there is one), ``cpu``, ``cuda``, ...
         progress: show a progress bar.
         tensorboard: write losses and scores for TensorBoard into the folder as well.
@@ -98,8 +101,8 @@ def train(
 
     Raises:
         ConfigError: ``resume`` with another recipe or other tasks, or without it although the
-            folder holds a run; the folder cannot be made; no such device; the loss is not finite;
-            or the processes cannot share a batch evenly.
+            folder holds a run; ``start_from`` with other networks; the folder cannot be made; no
+            such device; the loss is not finite; or the processes cannot share a batch evenly.
         DatasetError: the images are of a size that the networks cannot take.
         MissingDependencyError: ``tensorboard`` without the package of that name.
         ModelError: a checkpoint that cannot be read.
@@ -112,13 +115,9 @@ def train(
             raise ConfigError(
                 f"batches of {config.batch_size} cannot be shared evenly by {group.size} processes"
             )
-        run = Run(
-            Networks(config, place, group),
-            np.random.default_rng(config.seed),
-            torch.Generator().manual_seed(config.seed),
-        )
         if group.leads:
             _prepare_folder(folder, resume)
+        run = _new_run(config, place, group, start_from)
         if resume:
             state = _matching_checkpoint(folder / LAST, config, source) if group.leads else None
             run.load_state_dict(group.from_leader(state))
@@ -138,6 +137,22 @@ def train(
                 scores, seconds = entry["validation"], entry["seconds"]
                 print(f"epoch {epoch + 1}/{config.epochs}: {_summary(scores)}, {seconds:.0f} s")
         return group.from_leader(_finish(folder, source, place, config) if group.leads else None)
+
+
+def _new_run(
+    config: TrainingConfig,
+    device: torch.device,
+    group: ProcessGroup,
+    start_from: str | PathLike[str] | None,
+) -> Run:
+    run = Run(
+        Networks(config, device, group),
+        np.random.default_rng(config.seed),
+        torch.Generator().manual_seed(config.seed),
+    )
+    if start_from is not None:
+        run.networks.start_from(load_checkpoint(start_from)["networks"])
+    return run
 
 
 def _prepare_folder(folder: Path, resume: bool) -> None:
@@ -233,6 +248,8 @@ def _step(
         symmetries=config.symmetries,
         reversal=config.reversal,
     )
+    if len(config.scales) > 1:
+        batch = scaled_down(batch, int(run.rng.choice(config.scales)))
     noise = torch.randn(batch.free.shape, generator=run.noise_rng).to(device)
     share = networks.group.share
     batch, noise = Batch(*map(share, vars(batch).values())), share(noise)

@@ -125,9 +125,7 @@ def attach(
     planner.clear()
     setup.getProblemDefinition().clearSolutionPaths()
     progress = PlannerProgress(setup, positions)
-    stream.follow(
-        progress.best_cost, progress.informed_set if _is_informed(planner) else progress.no_set
-    )
+    stream.follow(progress.best_cost, progress.informed_set if _is_informed(planner) else None)
     parts = _Parts(setup, planner, name, positions, stream, progress, adaptation)
     undo_hook = _INSTALL[hook](parts)
     stream.prepare()

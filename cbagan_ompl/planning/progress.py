@@ -83,9 +83,6 @@ class PlannerProgress:
             return inf
         return best_cost(self._planner)
 
-    def no_set(self) -> None:
-        """The informed set of a planner that looks for shorter paths everywhere: there is none."""
-
     def informed_set(self) -> InformedSet | None:
         """The informed set of the task, once the planner has begun to plan.
 
