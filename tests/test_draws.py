@@ -41,6 +41,35 @@ def test_bad_uniform_fraction(corridor: Heatmap, fraction: float) -> None:
         DrawStream(corridor, fraction)
 
 
+@pytest.mark.parametrize("sharpness", [0, -1, float("nan"), inf, "sharp", None])
+def test_bad_sharpness(corridor: Heatmap, sharpness: float) -> None:
+    with pytest.raises(
+        ConfigError, match=f"sharpness is a finite number above 0, got {sharpness!r}"
+    ):
+        DrawStream(corridor, sharpness=sharpness)
+
+
+@pytest.mark.parametrize(("sharpness", "dim_share"), [(0.5, 1 / 3), (1, 1 / 5), (3, 1 / 65)])
+def test_draws_follow_a_power_of_the_heat_map(sharpness: float, dim_share: float) -> None:
+    # Half of the map has a quarter of the heat, and all of it little: only ratios count.
+    grid = GridMap(np.ones((40, 40), bool))
+    values = np.full(grid.shape, 4e-10)
+    values[:, :20] = 1e-10
+    stream = DrawStream(Heatmap(values, grid), 1e-9, seed=0, sharpness=sharpness)
+    assert abs((take(stream, 20_000)[:, 0] < 20).mean() - dim_share) < 0.01
+    near = np.array([stream.near(20, 20, 10) for _ in range(3000)])
+    assert abs((near[:, 0] < 20).mean() - dim_share) < 0.05
+
+
+def test_draws_stay_in_the_box_where_nothing_shortens_the_path(corridor: Heatmap) -> None:
+    stream = DrawStream(corridor, 0.5, seed=0)
+    low, high = np.array(START) - 0.1, np.array(START) + 0.1
+    stream.keep_inside(low, high)
+    stream.follow(lambda: 1.0, lambda: InformedSet(np.array([START]), np.array([GOAL]), 1.0))
+    points = take(stream, 20)
+    assert ((points >= low) & (points <= high)).all()
+
+
 def test_informed_draws_stay_in_the_ellipse(corridor: Heatmap) -> None:
     costs = iter([inf] * 100 + [900.0] * 5000 + [610.0] * 5000)
     informed = InformedSet(np.array([START]), np.array([GOAL]), tolerance=1.0)

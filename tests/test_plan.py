@@ -193,6 +193,8 @@ BAD = [
     ({"radius": None}, MapError, "radius"),
     ({"uniform_fraction": 0}, ConfigError, "uniform_fraction"),
     ({"uniform_fraction": "x"}, ConfigError, "uniform_fraction"),
+    ({"sharpness": 0}, ConfigError, "sharpness"),
+    ({"sharpness": "x"}, ConfigError, "sharpness"),
     ({"sampler": "learned", "heatmap": np.ones((3, 3))}, HeatmapError, "shape"),
     ({"sampler": "uniform", "model": "file"}, ConfigError, "uses no model"),
     ({"grid": "missing.png"}, MapError, "missing.png"),

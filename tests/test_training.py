@@ -22,7 +22,7 @@ from cbagan_ompl.network import losses, networks, training  # noqa: E402
 from cbagan_ompl.network.checkpoints import load_checkpoint  # noqa: E402
 from cbagan_ompl.network.cli import add_export_parser, add_train_parser  # noqa: E402
 from cbagan_ompl.network.config import TrainingConfig  # noqa: E402
-from cbagan_ompl.network.dataset import make_batch, transformed  # noqa: E402
+from cbagan_ompl.network.dataset import make_batch, scaled_down, transformed  # noqa: E402
 from cbagan_ompl.network.distributed import (  # noqa: E402
     GlobalBatchNorm,
     ProcessGroup,
@@ -196,6 +196,28 @@ def test_resume_refuses_another_recipe(source: DatasetSource, tmp_path: Path) ->
         train(source, config, tmp_path, device="cpu", progress=False)
     with pytest.raises(ConfigError, match="seed"):
         train(source, config.updated({"seed": 1}), tmp_path, resume=True, progress=False)
+
+
+def test_a_run_starts_from_the_weights_of_another(source: DatasetSource, tmp_path: Path) -> None:
+    first = train(source, TINY, tmp_path / "first", device="cpu", progress=False)
+    still = TINY.updated(
+        {"epochs": 1, "generator_lr": 1e-12, "map_discriminator_lr": 1e-12, "scales": [1, 2]}
+    )
+    again = train(
+        source,
+        still,
+        tmp_path / "again",
+        start_from=first["checkpoint"],
+        device="cpu",
+        progress=False,
+    )
+    before, after = (load_checkpoint(run["checkpoint"])["networks"] for run in (first, again))
+    for name, weights in before["average"].items():
+        if name.endswith("weight"):
+            torch.testing.assert_close(after["generator"][name], weights, rtol=0, atol=1e-6)
+    wider = TINY.updated({"widths": [4, 4, 6, 16]})
+    with pytest.raises(ConfigError, match="other networks"):
+        train(source, wider, tmp_path / "wider", start_from=first["checkpoint"], progress=False)
 
 
 def test_resume_without_a_run(source: DatasetSource, tmp_path: Path) -> None:
@@ -421,6 +443,17 @@ def test_symmetries_move_points_with_the_images(dataset: Dataset) -> None:
             assert turned[after[1], after[0]] == region[before[1], before[0]]
         seen.add((turned_free.tobytes(), turned.tobytes()))
     assert len(seen) == 8
+
+
+def test_smaller_maps_keep_passages_and_regions(dataset: Dataset) -> None:
+    batch = make_batch(dataset.train, np.arange(3), CPU)
+    assert scaled_down(batch, 1) is batch
+    half = scaled_down(batch, 2)
+    assert half.free.shape == half.region.shape == (3, 1, SIDE // 2, SIDE // 2)
+    assert torch.equal(half.start, batch.start / 2)
+    for small, full in ((half.free, batch.free), (half.region, batch.region)):
+        blocks = full.unfold(2, 2, 2).unfold(3, 2, 2)
+        assert torch.equal(small, blocks.amax((4, 5)))
 
 
 def test_augmented_batches_are_seeded(dataset: Dataset) -> None:

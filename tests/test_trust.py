@@ -115,6 +115,10 @@ def test_a_region_that_joins_nothing_is_doubted(corridor: Heatmap) -> None:
         trust, shares = make_trust(corridor, adaptation)
         trust.begin(joined)
         assert shares[-1] == share
+        if not joined:
+            for _ in range(1000):
+                trust.drawn()
+            assert shares[-1] == share, "nothing was followed that could change it"
 
 
 def test_a_cleared_tree_is_noticed(corridor: Heatmap) -> None:

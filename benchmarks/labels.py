@@ -1,0 +1,107 @@
+"""Which label leads planners best? Planning with true labels as heat maps, on generated maps.
+
+    python benchmarks/labels.py --maps 30 --json benchmarks/results/labels.json
+
+A network can at best paint what it is taught. Here planners draw from labels themselves: from the
+exact ones of several widths (EPSILON of cbagan_ompl.datasets.worlds), and from the paper's, the
+union of 50 runs of RRT. Ratios are to OMPL's own sampler, geometric means over the tasks.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import defaultdict
+from functools import partial
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import trange
+
+from cbagan_ompl import GridMap, Heatmap, PlanResult, plan
+from cbagan_ompl.datasets.generation import ITERATIONS, RANGE, RUNS
+from cbagan_ompl.datasets.geodesic import distances
+from cbagan_ompl.datasets.worlds import SLACK, WorldSettings, draw_world
+from cbagan_ompl.files import write_json
+from cbagan_ompl.planning.compat import ompl_version
+from cbagan_ompl.planning.labels import rrt_region
+
+EPSILONS = (0.01, 0.02, 0.05, 0.1)
+LONGEST_EDGE, TIME, WITHIN = 20.0, 0.4, 1.05
+PLANNERS = ("RRT", "RRTstar", "InformedRRTstar")
+# Training draws from part 0, validation and test from parts 1 and 2, the sharpness from part 3.
+PART = 4
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--maps", type=int, default=30, help="one task on each (default: 30)")
+    parser.add_argument("--runs", type=int, default=3, help="of each planner (default: 3)")
+    parser.add_argument("--json", metavar="FILE")
+    args = parser.parse_args()
+    ratios: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
+    seconds: dict[str, list[float]] = defaultdict(list)
+    for number in trange(args.maps):
+        world = draw_world(WorldSettings(), PART, number)
+        grid, ends = GridMap(world.maps[0]), (world.start[0], world.goal[0])
+        labels, optimum = labels_of(grid, ends, number, seconds)
+        for planner in PLANNERS:
+            measured = partial(measure, grid, ends, planner, optimum, args.runs)
+            own = measured(sampler="uniform")
+            for name, values in labels.items():
+                heatmap = Heatmap(values, grid)
+                ratios[name][planner].append(measured(heatmap=heatmap, sharpness=1.0) / own)
+    table = {
+        name: {planner: float(np.exp(np.mean(np.log(r)))) for planner, r in by_planner.items()}
+        | {"label_ms": 1e3 * float(np.median(seconds[name]))}
+        for name, by_planner in ratios.items()
+    }
+    for name, row in table.items():
+        print(name, {key: round(value, 3) for key, value in row.items()})
+    if args.json is not None:
+        write_json(args.json, {"ompl": ompl_version(), "maps": args.maps, "ratios": table})
+
+
+def labels_of(
+    grid: GridMap, ends: tuple[Any, Any], seed: int, seconds: dict[str, list[float]]
+) -> tuple[dict[str, NDArray[Any]], float]:
+    """The labels of a task by name, and its shortest way; notes what they took."""
+    (u, v), (x, y) = (end.astype(int).tolist() for end in ends)
+    began = perf_counter()
+    from_start, from_goal = distances(grid.free, (u, v)), distances(grid.free, (x, y))
+    exact = perf_counter() - began
+    optimum = float(from_start[y, x])
+    detour = np.where(grid.free, np.maximum(from_start + from_goal - optimum, 0), np.inf)
+    labels: dict[str, NDArray[Any]] = {}
+    for epsilon in EPSILONS:
+        name = f"exact, {epsilon:.0%}"
+        labels[name] = np.exp2(-detour / (epsilon * optimum + SLACK))
+        seconds[name].append(exact)
+    began = perf_counter()
+    task = grid.check_task(*ends)
+    labels["RRT"] = rrt_region(grid, task, RUNS, grid.width * RANGE, ITERATIONS, seed)
+    seconds["RRT"].append(perf_counter() - began)
+    return {name: values for name, values in labels.items() if values.any()}, optimum
+
+
+def measure(
+    grid: GridMap, ends: tuple[Any, Any], planner: str, optimum: float, runs: int, **options: Any
+) -> float:
+    """Median over the runs: nodes of RRT; time until the path is within 5 % of the others."""
+    results = [
+        plan(grid, *ends, planner=planner, range=LONGEST_EDGE, time=TIME, seed=seed, **options)
+        for seed in range(runs)
+    ]
+    return float(np.median([_measure(result, optimum) for result in results]))
+
+
+def _measure(result: PlanResult, optimum: float) -> float:
+    if result.planner == "RRT":
+        return float(result.nodes)
+    times = [time for time, cost in result.progress if cost <= WITHIN * optimum]
+    return times[0] if times else TIME
+
+
+if __name__ == "__main__":
+    main()
