@@ -123,7 +123,7 @@ class Heatmap:
             TaskError: see :meth:`GridMap.check_task`.
         """
         ends = grid.to_pixel(grid.check_task(start, goal))
-        pixels = shortest_path(grid.free, *_pixel_pair(ends))
+        pixels = shortest_path(grid.free, *pixel_pair(ends))
         assert pixels is not None, "check_task has made sure that a path exists"
         path = np.vstack((ends[:1], pull_taut(grid.free, pixels), ends[1:]))
         return cls(_band(grid.shape, path, _half_width(grid, _CORRIDOR_SHARE)), grid)
@@ -149,7 +149,7 @@ class Heatmap:
         ends = np.array((start, goal), dtype=np.float64)
         if not self.grid.is_free(ends).all():
             return False
-        first, second = _pixel_pair(self.grid.to_pixel(ends))
+        first, second = pixel_pair(self.grid.to_pixel(ends))
         label = int(self.parts[first[1], first[0]])
         return label > 0 and label == int(self.parts[second[1], second[0]])
 
@@ -173,7 +173,7 @@ class Heatmap:
         if self.joins(start, goal):
             return self
         price = np.where(self.region, np.float32(_REGION_PRICE), 1 + _REGION_PRICE - self.values)
-        pixels = shortest_path(self.grid.free, *_pixel_pair(ends), price, _REPAIR_SIDE)
+        pixels = shortest_path(self.grid.free, *pixel_pair(ends), price, _REPAIR_SIDE)
         assert pixels is not None, "check_task has made sure that a path exists"
         bridge = _band(
             self.grid.shape, pixels + np.float64(0.5), _half_width(self.grid, _BRIDGE_SHARE)
@@ -273,7 +273,8 @@ def _to_unit_range(raw: NDArray[Any]) -> NDArray[np.float32]:
     return values
 
 
-def _pixel_pair(ends: NDArray[np.float64]) -> tuple[tuple[int, int], tuple[int, int]]:
+def pixel_pair(ends: NDArray[np.float64]) -> tuple[tuple[int, int], tuple[int, int]]:
+    """The pixels (column, row) of two points (u, v), shape (2, 2)."""
     (u0, v0), (u1, v1) = np.floor(ends).astype(int).tolist()
     return (u0, v0), (u1, v1)
 

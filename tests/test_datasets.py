@@ -148,7 +148,7 @@ def test_a_folder_with_a_set_is_not_overwritten(folder: Path, tmp_path: Path) ->
     ("option", "value", "message"),
     [
         ("maps", 0, "maps must be at least 1"),
-        ("size", 40, "at least 48 pixels, got 40"),
+        ("size", 40, "size must be at least 48, got 40"),
         ("families", ("blocks", "castles"), "'castles'; there are blocked_cells, blocks, bug_trap"),
         ("range", -1.0, "range must be above 0"),
         ("min_distance", 1.0, "min_distance"),

@@ -198,7 +198,7 @@ def test_as_many_tasks_are_hard_as_were_asked_for() -> None:
 @pytest.mark.parametrize(
     ("option", "value", "message"),
     [
-        ("size", 40, "at least 48 pixels, got 40"),
+        ("size", 40, "size must be at least 48, got 40"),
         ("families", ("blocks", "castles"), "'castles'; there are blocked_cells, blocks"),
         ("families", (), "there are"),
         ("hard_share", 1.5, "hard_share is a share from 0 to 1, got 1.5"),
@@ -346,7 +346,7 @@ def test_train_and_export_on_worlds(tmp_path: Path, capsys: pytest.CaptureFixtur
     words += ["--hard-share", "0.5", "--world-seed", "7", "--config", str(recipe)]
     words += ["--device", "cpu", "--output", str(tmp_path / "run")]
     assert run("--worlds", *words) == 0
-    assert "16 tasks for training, 8 for testing" in capsys.readouterr().out
+    assert "16 training tasks an epoch, 8 for testing" in capsys.readouterr().out
     record = export(tmp_path / "run" / "best.pt", tmp_path / "worlds.pt")
     assert record["working_size"] == 64
     assert record["dataset"]["worlds"]["families"] == ["blocks", "caves"]

@@ -19,7 +19,7 @@ from ..checks import check_at_least, check_share, require
 from ..errors import ConfigError, DatasetError
 from ..files import write_json
 from ..gridmap import GridMap
-from ..heatmap import REGION_BORDER
+from ..heatmap import REGION_BORDER, pixel_pair
 from ..map_families import FAMILIES, MIN_SIDE, check_families
 from ..map_families.variation import world_map
 from .augmentation import augmented
@@ -90,8 +90,7 @@ class GenerationSettings:
     def __post_init__(self) -> None:
         for name in ("maps", "tasks", "copies", "runs"):
             check_at_least(name, getattr(self, name), 1)
-        if self.size < MIN_SIDE:
-            raise ConfigError(f"size must be at least {MIN_SIDE} pixels, got {self.size}")
+        check_at_least("size", self.size, MIN_SIDE)
         check_families(self.families)
         if self.label not in LABELS:
             raise ConfigError(f"a label is one of {', '.join(LABELS)}, got {self.label!r}")
@@ -218,7 +217,7 @@ def draw_map(settings: GenerationSettings, number: int) -> NDArray[np.bool_]:
 def _draw_task(
     grid: GridMap, settings: GenerationSettings, rng: np.random.Generator
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Start and goal, (2, 2), and their region; drawn again until RRT finds a path."""
+    """Start and goal, (2, 2), and their region; drawn again until they are joined."""
     rows, columns = np.nonzero(grid.free)
     points = (np.stack((columns, rows), axis=-1) + 0.5).astype(np.float64)
     hard = settings.hard_share > 0 and rng.random() < settings.hard_share
@@ -242,9 +241,9 @@ def _draw_task(
 def _is_hard(grid: GridMap, ends: NDArray[np.float64]) -> bool:
     from .geodesic import distances
 
-    start, goal = _pixels(ends)
+    start, goal = pixel_pair(ends)
     shortest = distances(grid.free, start)[goal[1], goal[0]]
-    return bool(shortest >= HARD_DETOUR * np.hypot(*(ends[1] - ends[0])))
+    return bool(HARD_DETOUR * np.hypot(*(ends[1] - ends[0])) <= shortest < np.inf)
 
 
 def _label(
@@ -253,16 +252,10 @@ def _label(
     if settings.label == "geodesic":
         from .geodesic import distances
 
-        start, goal = _pixels(ends)
+        start, goal = pixel_pair(ends)
         fields = distances(grid.free, start), distances(grid.free, goal)
         return detour_heat(*fields, goal) >= REGION_BORDER
     from ..planning.labels import rrt_region
 
     task = grid.check_task(*ends)
     return rrt_region(grid, task, settings.runs, settings.longest_edge, ITERATIONS, seed)
-
-
-def _pixels(ends: NDArray[np.float64]) -> tuple[tuple[int, int], tuple[int, int]]:
-    """The pixels (column, row) of start and goal."""
-    (u, v), (x, y) = ends.astype(int).tolist()
-    return (u, v), (x, y)

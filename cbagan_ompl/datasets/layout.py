@@ -43,14 +43,15 @@ class Tasks:
         map_of: (N,) index of the map of each task.
         start: (N, 2) pixel coordinates (u, v), centre of the spot.
         goal: (N, 2) the same.
-        region: (N, S, S) uint8, 1 in the region.
+        region: (N, S, S), 1 in the region: uint8 0 or 1 of a data set, float16 from 0 to 1 of
+            :mod:`.worlds`.
     """
 
     maps: NDArray[np.uint8]
     map_of: NDArray[np.int64]
     start: NDArray[np.float32]
     goal: NDArray[np.float32]
-    region: NDArray[np.uint8]
+    region: NDArray[np.uint8 | np.float16]
 
     def __len__(self) -> int:
         return len(self.region)

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import check_at_least, check_share
-from ..errors import ConfigError
 from ..map_families import FAMILIES, MIN_SIDE, check_families
 from ..map_families.variation import world_map
 from .layout import Tasks
@@ -52,8 +51,7 @@ class WorldSettings:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if self.size < MIN_SIDE:
-            raise ConfigError(f"size must be at least {MIN_SIDE} pixels, got {self.size}")
+        check_at_least("size", self.size, MIN_SIDE)
         check_families(self.families)
         check_share("hard_share", self.hard_share)
         check_at_least("seed", self.seed, 0)

@@ -2,8 +2,8 @@
 
 Every family is a function that draws one map: free pixels are true, row 0 is on top, lengths are in
 pixels. The free pixels of a map are all connected (4-connected): pockets that no path reaches are
-filled. Where nothing else is said, only NumPy draws, so that the same seed gives the same bits with
-every version of the other libraries.
+filled. All chance is NumPy's: the same seed gives the same map with the same versions of NumPy,
+SciPy and OpenCV.
 """
 
 from __future__ import annotations
@@ -71,7 +71,9 @@ def check_families(names: Sequence[str]) -> None:
         ConfigError: it is; the message lists those that are.
     """
     unknown = [name for name in names if name not in FAMILIES]
-    if unknown or not names:
+    if not names:
+        raise ConfigError(f"no map family is named; there are {', '.join(FAMILIES)}")
+    if unknown:
         raise ConfigError(
             f"unknown map family {', '.join(unknown)!r}; there are {', '.join(FAMILIES)}"
         )

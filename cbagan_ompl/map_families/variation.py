@@ -66,7 +66,10 @@ def _worn(rng: np.random.Generator, free: Mask) -> Mask:
 
 
 def _placed(rng: np.random.Generator, free: Mask, side: int) -> Mask:
-    """A square with the map in it, upright or turned, smaller where that makes it fit."""
+    """A square with the map in it, upright, or turned and scaled.
+
+    Outside of an upright map all is blocked; outside of a turned one it is open ground at times.
+    """
     height, width = free.shape
     outside = int(rng.random() < 0.3)
     if rng.random() >= _TURNED:

@@ -190,7 +190,7 @@ def _train(args: argparse.Namespace) -> int:
             if leads():
                 values = source.description()
                 print(
-                    f"{values['train_tasks']} tasks for training, "
+                    f"{values['train_tasks']} training tasks an epoch, "
                     f"{values['test_tasks']} for testing"
                 )
             result = train(

@@ -43,7 +43,7 @@ class Batch:
         free: (B, 1, S, S) float, 1 where free.
         start: (B, 2) pixel coordinates (u, v).
         goal: (B, 2) the same.
-        region: (B, 1, S, S) float, 1 in the region.
+        region: (B, 1, S, S) float in [0, 1], 1 in the region.
     """
 
     free: Tensor

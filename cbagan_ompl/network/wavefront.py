@@ -17,7 +17,7 @@ class Wavefront(nn.Module):
     For each of C metrics a 1x1 convolution gives the cost of every step between neighbouring
     places (8-connected); D_s and D_g are the costs of the cheapest ways from the start and from
     the goal. With the cheapest way of all, D*, the relative detour of a place is
-    (D_s + D_g) / D* - 1.
+    (D_s + D_g - D*) / (D* + 1).
 
     Fronts spread without gradients until they stand still. The gradient of a distance is the one
     of the costs along its cheapest way.
@@ -69,7 +69,7 @@ def step_costs(edges: Tensor) -> Tensor:
             across corners are the root of 2 times as long.
 
     Returns:
-        (8, H, W, B, C); 0 for steps from outside.
+        (8, H, W, B, C). From outside no front comes, whatever the step costs.
     """
     right, below, falling, rising = edges.chunk(4, 3)
     falling, rising = 2.0**0.5 * falling, 2.0**0.5 * rising
