@@ -25,7 +25,7 @@ _FLOOR = 1e-4
 
 
 def load_model(path: str | PathLike[str] | None = None) -> Predictor:
-    """Load an exported model.
+    """Load an exported model, ready to predict.
 
     TorchScript files can carry code, so load only files from a source that you trust.
 
@@ -40,13 +40,14 @@ def load_model(path: str | PathLike[str] | None = None) -> Predictor:
     source = bundled_model() if path is None else Path(path)
     record = read_record(source)
     try:
-        module = load_script(source)
+        predictor = Predictor(load_script(source), record)
+        predictor.warm_up()
     except Exception as error:  # torch raises many types for damaged archives
         raise ModelError(
             f"{source}: torch cannot load the model ({type(error).__name__}), the file is "
             "probably damaged; copy or export it again"
         ) from error
-    return Predictor(module, record)
+    return predictor
 
 
 class Predictor:
@@ -67,6 +68,12 @@ class Predictor:
         self._module = module
         self.record = record
         self.inference_threads = 1
+
+    def warm_up(self) -> None:
+        """Predict for an empty map: the first call takes up to four times as long as the others."""
+        side = int(self.record["working_size"])
+        ends = np.array([[0.5, 0.5], [side - 0.5, side - 0.5]])
+        self.probabilities(np.ones((1, side, side), np.bool_), ends[:1], ends[1:])
 
     def predict(
         self, grid: GridMap, start: ArrayLike, goal: ArrayLike, repair: bool = True
