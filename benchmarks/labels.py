@@ -1,6 +1,6 @@
 """Which label leads planners best? Planning with true labels as heat maps, on generated maps.
 
-    python benchmarks/labels.py --maps 30 --json benchmarks/results/labels.json
+    python benchmarks/labels.py --maps 16 --json benchmarks/results/labels.json
 
 A network can at best paint what it is taught. Here planners draw from labels themselves: from the
 exact ones of several widths (EPSILON of cbagan_ompl.datasets.worlds), and from the paper's, the
