@@ -47,10 +47,10 @@ def main() -> None:
         heatmap = predictor.predict(grid, start, goal)
         for planner in MEASURES:
             options = {"planner": planner, "range": RANGE, "time": TIME, "seed": number}
-            own = measure(plan(grid, start, goal, sampler="uniform", **options), optimum)
+            own = measure(plan(grid, start, goal, sampler="uniform", **options), optimum, TIME)
             for power in POWERS:
                 result = plan(grid, start, goal, heatmap=heatmap, sharpness=power, **options)
-                ratios[planner][power].append(measure(result, optimum) / own)
+                ratios[planner][power].append(measure(result, optimum, TIME) / own)
     medians = {
         planner: {str(power): float(np.median(values)) for power, values in by_power.items()}
         for planner, by_power in ratios.items()
@@ -63,12 +63,15 @@ def main() -> None:
         draw(medians, args.plot)
 
 
-def measure(result: PlanResult, optimum: float) -> float:
-    """Nodes of RRT; of the others the time until the path is within 5 % of the shortest."""
+def measure(result: PlanResult, optimum: float, limit: float) -> float:
+    """Nodes of RRT; of the others the time until the path is within 5 % of the shortest.
+
+    Those that do not get there count with the limit of their time.
+    """
     if result.planner == "RRT":
         return float(result.nodes)
     times = [time for time, cost in result.progress if cost <= WITHIN * optimum]
-    return times[0] if times else TIME
+    return times[0] if times else limit
 
 
 def draw(medians: dict[str, dict[str, float]], path: str) -> None:

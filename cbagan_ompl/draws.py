@@ -87,8 +87,8 @@ class DrawStream:
         seed: int | np.random.Generator | None = None,
         sharpness: float = 1.0,
     ) -> None:
-        check_uniform_fraction(uniform_fraction)
-        check_sharpness(sharpness)
+        _check_uniform_fraction(uniform_fraction)
+        _check_sharpness(sharpness)
         self.heatmap = heatmap
         self.uniform_fraction = float(uniform_fraction)
         self._sharpness = np.float32(sharpness)
@@ -343,12 +343,22 @@ class _Source:
         return self._grid.to_world(np.stack((columns, rows), axis=-1) + 0.5)
 
 
-def check_uniform_fraction(uniform_fraction: float) -> None:
-    """Refuse a share that is no share, or that leaves nothing uniform.
+def check_draw_options(uniform_fraction: float, sharpness: float | None) -> None:
+    """Refuse options that no stream of draws can be made with.
+
+    Args:
+        uniform_fraction: see :class:`DrawStream`.
+        sharpness: the same, or None where the planner decides.
 
     Raises:
-        ConfigError: outside (0, 1].
+        ConfigError: see :class:`DrawStream`.
     """
+    _check_uniform_fraction(uniform_fraction)
+    if sharpness is not None:
+        _check_sharpness(sharpness)
+
+
+def _check_uniform_fraction(uniform_fraction: float) -> None:
     if not (isinstance(uniform_fraction, SupportsFloat) and 0 < uniform_fraction <= 1):
         raise ConfigError(
             f"uniform_fraction is a share above 0 and up to 1, got {uniform_fraction!r}; it "
@@ -356,12 +366,7 @@ def check_uniform_fraction(uniform_fraction: float) -> None:
         )
 
 
-def check_sharpness(sharpness: float) -> None:
-    """Refuse a power that makes no density.
-
-    Raises:
-        ConfigError: not a finite number above 0.
-    """
+def _check_sharpness(sharpness: float) -> None:
     if not (isinstance(sharpness, SupportsFloat) and isfinite(sharpness) and sharpness > 0):
         raise ConfigError(f"sharpness is a finite number above 0, got {sharpness!r}")
 

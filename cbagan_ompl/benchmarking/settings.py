@@ -12,7 +12,7 @@ from typing import Any
 import yaml
 
 from ..checks import check_at_least
-from ..draws import DEFAULT_UNIFORM_FRACTION, check_sharpness, check_uniform_fraction
+from ..draws import DEFAULT_UNIFORM_FRACTION, check_draw_options
 from ..errors import ConfigError
 from ..trust import ADAPTATION_PARTS, Adaptation
 
@@ -73,9 +73,7 @@ class Settings:
         for name, value in (("time", self.time), ("range", self.range)):
             if value is not None and not (isfinite(value) and value > 0):
                 raise ConfigError(f"{name} must be above 0, got {value}")
-        check_uniform_fraction(self.uniform_fraction)
-        if self.sharpness is not None:
-            check_sharpness(self.sharpness)
+        check_draw_options(self.uniform_fraction, self.sharpness)
         Adaptation.of(self.adaptation)
         check_at_least("seed", self.seed, 0)
         for planner in self.parameters:

@@ -95,23 +95,27 @@ def draw_world(settings: WorldSettings, part: int, number: int) -> Tasks:
 
 
 def detour_heat(
-    from_start: NDArray[np.float32], from_goal: NDArray[np.float32], goal: tuple[int, int]
+    from_start: NDArray[np.float32],
+    from_goal: NDArray[np.float32],
+    goal: tuple[int, int],
+    epsilon: float = EPSILON,
 ) -> NDArray[np.float32]:
-    """The heat map of a task: 1 on a shortest path, 0.5 where a path through takes EPSILON more.
+    """The heat map of a task: 1 on a shortest path, 0.5 where a path through takes epsilon more.
 
     The best path through x is D_s(x) + D_g(x) long, the shortest of all D*. A heat of
-    2 ** -((D_s + D_g - D*) / (EPSILON D* + SLACK)) makes the values from one half on the informed
-    set of the task with walls taken into account: every path that is not more than EPSILON longer
+    2 ** -((D_s + D_g - D*) / (epsilon D* + SLACK)) makes the values from one half on the informed
+    set of the task with walls taken into account: every path that is not more than epsilon longer
     (give or take the slack) stays in it, of every homotopy class.
 
     Args:
         from_start: distances from the start, (H, W).
         from_goal: distances from the goal, (H, W).
         goal: (column, row) of the goal.
+        epsilon: relative detour at the border of the region.
     """
     shortest = float(from_start[goal[1], goal[0]])
     detour = np.maximum(from_start + from_goal - np.float32(shortest), 0)
-    heat: NDArray[np.float32] = np.exp2(-detour / np.float32(EPSILON * shortest + SLACK))
+    heat: NDArray[np.float32] = np.exp2(-detour / np.float32(epsilon * shortest + SLACK))
     return heat
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..draws import DEFAULT_UNIFORM_FRACTION, check_sharpness, check_uniform_fraction
+from ..draws import DEFAULT_UNIFORM_FRACTION, check_draw_options
 from ..errors import ConfigError
 from ..gridmap import GridMap
 from ..heatmap import Heatmap
@@ -179,9 +179,7 @@ def plan(
     longest_edge = None if range is None else _positive("range", range)
     count_limit = None if iterations is None else _whole("iterations", iterations, 1)
     used_seed = secrets.randbits(32) if seed is None else _whole("seed", seed, 0)
-    check_uniform_fraction(uniform_fraction)
-    if sharpness is not None:
-        check_sharpness(sharpness)
+    check_draw_options(uniform_fraction, sharpness)
     kind = compat.planner_class(planner)
     if sampler != "uniform":
         hook_of(planner)
