@@ -1,4 +1,4 @@
-"""Patches, wavefronts and white obstacles of the generator."""
+"""The generator that reads patches: its options, and its exported form."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from cbagan_ompl import ConfigError, DatasetError  # noqa: E402
+from cbagan_ompl.network.blocks import stride_of  # noqa: E402
 from cbagan_ompl.network.config import TrainingConfig  # noqa: E402
 from cbagan_ompl.network.dataset import check_trainable  # noqa: E402
 from cbagan_ompl.network.discriminators import Discriminator  # noqa: E402
 from cbagan_ompl.network.encoding import map_image, point_image  # noqa: E402
 from cbagan_ompl.network.export import fold_shortcuts, save_script  # noqa: E402
-from cbagan_ompl.network.generator import Generator, places, stride_of  # noqa: E402
+from cbagan_ompl.network.generator import Generator  # noqa: E402
 from cbagan_ompl.network.networks import make_generator  # noqa: E402
+from cbagan_ompl.network.patch_generator import PatchGenerator, squares  # noqa: E402
 from cbagan_ompl.network.patch_model import PatchModel  # noqa: E402
 from cbagan_ompl.network.region_model import ImageModel, RegionModel  # noqa: E402
 
@@ -25,9 +27,11 @@ CONFIG = TrainingConfig(
 )
 
 
-def generator(**options: object) -> Generator:
+def generator(**options: object) -> PatchGenerator:
     torch.manual_seed(0)
-    return make_generator(CONFIG.updated(options)).eval()
+    made = make_generator(CONFIG.updated(options)).eval()
+    assert isinstance(made, PatchGenerator)
+    return made
 
 
 def images(free: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
@@ -50,8 +54,10 @@ def test_the_image_has_the_size_of_the_map_and_white_obstacles(height: int, widt
     assert image.shape == (2, 3, height, width)
     obstacles = (free == 0).expand_as(image)
     assert (image[obstacles] == 1).all()
-    assert (image[~obstacles].abs() < 1).all()
-    assert (generator(white_obstacles=False)(*images(free))[obstacles] != 1).all()
+    assert (image[:, ::2][~obstacles[:, ::2]].abs() < 1).all()
+    assert (image[:, 1] == 1).all(), "green on white is green everywhere"
+    unmasked = generator(white_obstacles=False)(*images(free))
+    assert (unmasked[:, ::2][obstacles[:, ::2]] != 1).all()
 
 
 def test_the_exported_model_gives_obstacles_no_probability() -> None:
@@ -107,14 +113,15 @@ def test_points_and_noise_matter_to_the_pixel() -> None:
 
 def test_the_default_options_are_the_papers_generator() -> None:
     assert (TrainingConfig().stem, TrainingConfig().patch, TrainingConfig().metrics) == (16, 1, 0)
-    model = generator(patch=1, metrics=0)
-    assert model.wavefront is None
+    model = make_generator(TrainingConfig())
+    assert isinstance(model, Generator)
     assert model.map_stem.kernel_size == (3, 3)
+    assert not TrainingConfig().white_obstacles
 
 
 def test_fronts_begin_where_most_of_a_spot_is() -> None:
     starts, goals = torch.tensor([[13.0, 3.0], [8.0, 20.5]]), torch.tensor([[30.5, 25.2]] * 2)
-    ends = places(point_image(starts, goals, 32, 40), 8)
+    ends = squares(point_image(starts, goals, 32, 40), 8)
     assert ends.shape == (2, 2, 4, 5)
     assert ends[0, 0].nonzero().tolist() == [[0, 1]]
     # Half of it on either side of a border.
@@ -180,3 +187,25 @@ def test_sides_are_multiples_of_the_stride() -> None:
 def test_options_that_make_no_sense(option: str, value: float) -> None:
     with pytest.raises(ConfigError, match=option):
         CONFIG.updated({option: value})
+
+
+@pytest.mark.parametrize("option", [{"metrics": 1}, {"white_obstacles": True}])
+def test_options_of_patches_are_refused_without_them(option: dict[str, object]) -> None:
+    with pytest.raises(ConfigError, match=f"{next(iter(option))} must be left out where patch is"):
+        TrainingConfig().updated(option)
+
+
+def test_fronts_heed_walls_before_anything_is_learned() -> None:
+    # A wall through the middle, open at the top: the fronts must not flow through it.
+    free = torch.ones(1, 1, 128, 128)
+    free[:, :, 16:, 56:72] = 0
+    model = generator(metrics=3)
+    assert model.wavefront is not None
+    seen: list[torch.Tensor] = []
+    model.wavefront.register_forward_hook(lambda _, inputs, fronts: seen.append(fronts))
+    points = point_image(torch.tensor([[20.5, 100.5]]), torch.tensor([[108.5, 100.5]]), 128, 128)
+    with torch.no_grad():
+        model(map_image(free), points, torch.zeros_like(free))
+    sharp = seen[0][0, :3]
+    assert (sharp[:, :2, 7:9].amax((1, 2)) > 0.9).all(), "the best ways pass the opening"
+    assert (sharp[:, 12, 7:9] < 0.4).all(), "and not the wall, straight on"

@@ -14,8 +14,9 @@ from ..errors import ModelError
 from .config import TrainingConfig
 from .generator import Generator
 from .networks import make_generator
+from .patch_generator import PatchGenerator
 
-SCHEMA = 1
+SCHEMA = 2
 LAST, BEST = "last.pt", "best.pt"
 
 
@@ -50,7 +51,7 @@ def load_checkpoint(path: str | PathLike[str]) -> dict[str, Any]:
     return state
 
 
-def best_generator(state: dict[str, Any]) -> Generator:
+def best_generator(state: dict[str, Any]) -> Generator | PatchGenerator:
     """The generator of a checkpoint that its epoch was validated with."""
     config = TrainingConfig().updated(state["config"])
     generator = make_generator(config)

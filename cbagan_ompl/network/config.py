@@ -36,10 +36,11 @@ class TrainingConfig:
             are lowered (on top of the schedule); 0 turns it off.
         plateau_factor: factor on the learning rates each time.
         widths: channels of the generator after each of its four stages down.
-        stem: channels of its map stem and point stem.
-        noise_stem: channels of its noise stem.
-        patch: side of the patches of pixels that its stems read as one place.
-        metrics: of its wavefronts; 0 for none.
+        stem: channels of its map stem (the paper's has a point stem with as many).
+        patch: side of the patches of pixels that its map stem reads as one place; with 1 it is the
+            paper's generator, which reads pixels.
+        noise_stem: channels of the noise stem of the paper's generator.
+        metrics: of the wavefronts of a generator with patches; 0 for none.
         channel_attention: use channel attention (in all three networks).
         spatial_attention: use spatial attention (in all three networks).
         self_attention: use the self-attention of SAGAN (in all three networks).
@@ -55,7 +56,8 @@ class TrainingConfig:
         dice_smooth: smoothing term of the Dice loss.
         positive_weight: factor of the region's part of the binary cross-entropy; above 1 a missed
             place costs more than one too many.
-        white_obstacles: the generator paints obstacles white, and learns about free space alone.
+        white_obstacles: a generator with patches paints obstacles white, and learns about free
+            space alone.
         scales: each batch is scaled down by one of these factors at random, so that the networks
             learn to see coarse maps as well.
         symmetries: turn and mirror each task at random (8 symmetries of the square).
@@ -85,8 +87,8 @@ class TrainingConfig:
     plateau_factor: float = 0.1
     widths: tuple[int, ...] = (32, 64, 96, 128)
     stem: int = 16
-    noise_stem: int = 32
     patch: int = 1
+    noise_stem: int = 32
     metrics: int = 0
     channel_attention: bool = True
     spatial_attention: bool = True
@@ -126,6 +128,10 @@ class TrainingConfig:
         at_least_one = ("epochs", "discriminator_width", "adversarial_every")
         for name in (*at_least_one, "stem", "noise_stem", "patch"):
             self._check(name, getattr(self, name) >= 1, "at least 1")
+        for name in ("metrics", "white_obstacles"):
+            self._check(
+                name, self.patch > 1 or not getattr(self, name), "left out where patch is 1"
+            )
         for name in ("generator_lr", "map_discriminator_lr", "point_discriminator_lr"):
             self._check(name, getattr(self, name) > 0, "positive")
         for name in ("decay", "plateau_factor"):
@@ -261,18 +267,18 @@ NETWORKS: dict[str, dict[str, Any]] = {
 PRESETS: dict[str, TrainingConfig] = {
     "best": TrainingConfig(),
     "worlds": TrainingConfig(
-        epochs=34,
+        epochs=50,
         batch_size=16,
         warmup=0.05,
-        stem=24,
-        noise_stem=8,
+        widths=(32, 32, 64, 96),
         patch=4,
-        metrics=6,
+        metrics=3,
         white_obstacles=True,
         adversarial_every=8,
         pixel_weight=4.0,
         dice_weight=2.0,
         positive_weight=2.0,
+        scales=(1, 1, 1, 2),
         precision="bfloat16",
     ),
     "paper": TrainingConfig(

@@ -13,8 +13,8 @@ from torch.nn import functional
 
 from ..datasets.layout import Tasks
 from ..errors import DatasetError
+from .blocks import stride_of
 from .config import TrainingConfig
-from .generator import stride_of
 
 
 def check_trainable(side: int, config: TrainingConfig) -> None:

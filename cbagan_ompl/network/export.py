@@ -13,8 +13,8 @@ import torch
 from torch import nn
 
 from ..errors import ModelError
+from .blocks import ResidualBlock
 from .checkpoints import best_generator, load_checkpoint
-from .generator import Generator, ResidualBlock
 from .model_files import MANIFEST, RECORD_NAME, RECORD_SCHEMA, read_manifest, sha256
 from .region_model import RegionModel
 
@@ -108,7 +108,7 @@ def _folded(pool: nn.AvgPool2d, conv: nn.Conv2d, norm: nn.BatchNorm2d) -> nn.Con
 
 
 def make_record(
-    name: str, state: dict[str, Any], generator: Generator, note: str = ""
+    name: str, state: dict[str, Any], generator: nn.Module, note: str = ""
 ) -> dict[str, Any]:
     """What a model file says about itself.
 

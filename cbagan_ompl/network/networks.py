@@ -19,6 +19,7 @@ from .discriminators import Discriminator
 from .distributed import ProcessGroup, share_batch_norm
 from .encoding import map_image, point_image, region_image
 from .generator import Generator
+from .patch_generator import PatchGenerator
 
 
 class Networks:
@@ -146,13 +147,15 @@ def _place(network: nn.Module, device: torch.device) -> None:
     network.to(device, memory_format=torch.channels_last)  # type: ignore[call-overload]
 
 
-def make_generator(config: TrainingConfig) -> Generator:
+def make_generator(config: TrainingConfig) -> Generator | PatchGenerator:
     """The generator that a recipe asks for, with fresh weights."""
-    return Generator(
+    attention = attention_of(config)
+    if config.patch == 1:
+        return Generator(config.widths, attention, config.stem, config.noise_stem)
+    return PatchGenerator(
         config.widths,
-        attention_of(config),
+        attention,
         config.stem,
-        config.noise_stem,
         config.patch,
         config.metrics,
         config.white_obstacles,

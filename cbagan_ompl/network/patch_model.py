@@ -9,55 +9,63 @@ from __future__ import annotations
 
 import torch
 from torch import Tensor, nn
+from torch.nn import functional
 
 from .encoding import SPOT_RADIUS, point_image
-from .generator import Generator, places
+from .patch_generator import PatchGenerator, squares
 
 
 class PatchModel(nn.Module):
     """What :class:`.region_model.ImageModel` says, to within rounding.
 
     Args:
-        generator: with its trained weights, in evaluation mode; its patch is above 1.
+        generator: with its trained weights, in evaluation mode.
     """
 
-    def __init__(self, generator: Generator) -> None:
+    def __init__(self, generator: PatchGenerator) -> None:
         super().__init__()
         self.generator = generator
-        self.patch = generator.patch
-        self.place = 2 * generator.patch
-        # The spot of a point touches no more places than that along a side.
+        self.patch, self.square = generator.patch, generator.square
+        # The spot of a point touches no more squares than that along a side.
         self.window = 3
         self.reach = SPOT_RADIUS + 0.5
         self.map_stem = _of_free_space(generator.map_stem)
-        self.head = _of_red_and_blue(generator.head)
-        self.of_white = _answer(generator.point_stem, torch.ones(1, 3, self.patch, self.patch))
-        self.of_silence = _answer(generator.noise_stem, torch.zeros(1, 1, self.patch, self.patch))
+        self.head = _as_linear(generator.head)
+        with torch.no_grad():
+            white = generator.point_stem(torch.ones(1, 3, self.square, self.square))
+            silence = generator.noise_stem(torch.zeros(1, 1, self.square, self.square))
+        self.of_silence = nn.Parameter(silence, requires_grad=False)
+        self.of_white = nn.Parameter(white + silence, requires_grad=False)
 
     def forward(self, free: Tensor, start: Tensor, goal: Tensor) -> Tensor:
         """As :meth:`.region_model.RegionModel.forward`, for sides that the generator takes."""
         batch, height, width = free.size(0), free.size(2) // self.patch, free.size(3) // self.patch
         tiles = free.view(batch, height, self.patch, width, self.patch).transpose(2, 3)
         of_map = torch.relu(self.map_stem(tiles.flatten(3))).permute(0, 3, 1, 2)
-        of_points = torch.empty_like(of_map).copy_(self.of_white)
+        size = [batch, self.of_white.size(1), height // 2, width // 2]
+        of_points = torch.empty(size, device=free.device, memory_format=torch.channels_last)
+        of_points.copy_(self.of_white)
         ends = torch.zeros(batch, 2, height // 2, width // 2, device=free.device)
+        # Windows around both ends, with the whole spot of one and what there is of the other.
+        points, side = torch.cat((start, goal)), self.square * self.window
         farthest = torch.tensor([width // 2, height // 2], device=free.device) - self.window
-        for end, point in enumerate([start, goal]):
-            # The whole of a spot, and what a window next to it has of the other one.
-            corner = ((point - self.reach) / self.place).floor().clamp(min=0.0)
-            corner = torch.minimum(corner, farthest)
-            shift, size = self.place * corner, self.place * self.window
-            window = point_image(start - shift, goal - shift, size, size)
-            paste(torch.relu(self.generator.point_stem(window)), of_points, 2 * corner)
-            paste(places(window, self.place)[:, end : end + 1], ends[:, end : end + 1], corner)
-        of_noise = self.of_silence.expand(batch, -1, height, width)
-        of_noise = of_noise.contiguous(memory_format=torch.channels_last)
-        features = self.generator.features(of_map, of_points, of_noise, ends)
-        red, blue = torch.tanh(self.head(features.permute(0, 2, 3, 1))).chunk(2, 3)
-        tiles = (0.5 - 0.25 * (red + blue)).view(batch, height, width, self.patch, self.patch)
+        corners = ((points - self.reach) / self.square).floor().clamp(min=0.0)
+        corners = torch.minimum(corners, farthest)
+        shift = self.square * corners
+        windows = point_image(start.repeat(2, 1) - shift, goal.repeat(2, 1) - shift, side, side)
+        of_windows = (self.generator.point_stem(windows) + self.of_silence).chunk(2)
+        spots = squares(windows, self.square)
+        for end, corner in enumerate(corners.chunk(2)):
+            paste(of_windows[end], of_points, corner)
+            spot = spots[end * batch : (end + 1) * batch, end : end + 1]
+            paste(spot, ends[:, end : end + 1], corner)
+        blocked = 1 - functional.avg_pool2d(free, self.square)
+        features = self.generator.features(of_map, of_points, blocked, ends)
+        tiles = torch.sigmoid(self.head(features.permute(0, 2, 3, 1)))
+        tiles = tiles.view(batch, height, width, self.patch, self.patch)
         probability = tiles.transpose(2, 3).reshape(free.size())
         if self.generator.white_obstacles:
-            probability = probability * (free + 0.5).floor()
+            probability = probability.masked_fill(free < 0.5, 0.0)
         return probability
 
 
@@ -75,11 +83,6 @@ def paste(windows: Tensor, images: Tensor, corners: Tensor) -> None:
         images[i, :, row : row + height, column : column + width] = windows[i]
 
 
-def _answer(stem: nn.Conv2d, patch: Tensor) -> nn.Parameter:
-    with torch.no_grad():
-        return nn.Parameter(torch.relu(stem(patch)), requires_grad=False)
-
-
 def _of_free_space(stem: nn.Conv2d) -> nn.Linear:
     """A map stem that reads the pixels of a patch, 1 where free, in place of three colours."""
     assert stem.bias is not None
@@ -90,12 +93,11 @@ def _of_free_space(stem: nn.Conv2d) -> nn.Linear:
     return reading
 
 
-def _of_red_and_blue(head: nn.Conv2d) -> nn.Linear:
-    """A last layer that leaves out green, which is 1 inside and outside of the region."""
-    assert head.bias is not None
-    painting = nn.Linear(head.in_channels, head.out_channels // 3 * 2)
+def _as_linear(conv: nn.Conv2d) -> nn.Linear:
+    """A 1x1 convolution as a layer that reads places whose channels come last."""
+    assert conv.bias is not None
+    linear = nn.Linear(conv.in_channels, conv.out_channels)
     with torch.no_grad():
-        for of_two, of_three in ((painting.weight, head.weight), (painting.bias, head.bias)):
-            red, _, blue = of_three.chunk(3)
-            of_two.copy_(torch.cat((red, blue)).view(of_two.shape))
-    return painting
+        linear.weight.copy_(conv.weight.flatten(1))
+        linear.bias.copy_(conv.bias)
+    return linear

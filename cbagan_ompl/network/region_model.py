@@ -7,7 +7,8 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from .encoding import map_image, point_image, region_probability
-from .generator import Generator, stride_of
+from .generator import Generator
+from .patch_generator import PatchGenerator
 from .patch_model import PatchModel
 
 
@@ -20,10 +21,13 @@ class RegionModel(nn.Module):
         generator: with its trained weights, in evaluation mode.
     """
 
-    def __init__(self, generator: Generator) -> None:
+    def __init__(self, generator: Generator | PatchGenerator) -> None:
         super().__init__()
-        self.stride = stride_of(generator.patch)
-        self.model = PatchModel(generator) if generator.patch > 1 else ImageModel(generator)
+        self.stride = generator.stride
+        if isinstance(generator, PatchGenerator):
+            self.model: nn.Module = PatchModel(generator)
+        else:
+            self.model = ImageModel(generator)
 
     def forward(self, free: Tensor, start: Tensor, goal: Tensor) -> Tensor:
         """Probability of the region, (B, 1, H, W) in [0, 1], for any height and width.
@@ -35,9 +39,11 @@ class RegionModel(nn.Module):
         """
         height, width = free.size(2), free.size(3)
         # Blocked pixels to the right and below fill up to the strides and are cut off again.
-        padded = functional.pad(free, [0, -width % self.stride, 0, -height % self.stride])
-        probability: Tensor = self.model(padded, start, goal)
-        return probability[:, :, :height, :width].clamp(0.0, 1.0)
+        right, below = -width % self.stride, -height % self.stride
+        if right > 0 or below > 0:
+            free = functional.pad(free, [0, right, 0, below])
+        probability: Tensor = self.model(free, start, goal)
+        return probability[:, :, :height, :width]
 
 
 class ImageModel(nn.Module):
@@ -47,7 +53,7 @@ class ImageModel(nn.Module):
         generator: with its trained weights, in evaluation mode.
     """
 
-    def __init__(self, generator: Generator) -> None:
+    def __init__(self, generator: Generator | PatchGenerator) -> None:
         super().__init__()
         self.generator = generator
 
@@ -55,4 +61,4 @@ class ImageModel(nn.Module):
         """As :meth:`RegionModel.forward`."""
         points = point_image(start, goal, free.size(2), free.size(3))
         image = self.generator(map_image(free), points, torch.zeros_like(free))
-        return region_probability(image)
+        return region_probability(image).clamp(0.0, 1.0)

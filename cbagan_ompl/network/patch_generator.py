@@ -1,0 +1,127 @@
+"""The generator for maps larger than the paper's: patches of pixels, and wavefronts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from .attention import CBAM, Attention
+from .blocks import ResidualBlock, Trunk, stride_of
+from .encoding import region_image
+from .wavefront import Wavefront
+
+# What a whole square of obstacles adds to the logarithm of the costs of the steps from it, before
+# anything is learned. Fronts that flow through walls teach little: without it runs take several
+# epochs to find out, and with few metrics some never do.
+_WALL_PRICE = 4.0
+
+
+class PatchGenerator(nn.Module):
+    """The paper's generator with what its 64 pixels did not ask for: sight, and speed.
+
+    The map stem reads each patch of P x P pixels as one place, every pixel of it, and the last
+    layer paints all of its pixels, so that no pixel is lost. Squares of four places are where the
+    points and the noise come in, where the stages of the paper's generator begin and end, and
+    where wavefronts (:class:`.wavefront.Wavefront`) spread over the whole map.
+
+    Args:
+        widths: channels of the four stages on the way down; the way up mirrors them.
+        attention: see :class:`.attention.AttentionBlock`.
+        stem: channels of the places.
+        patch: P.
+        metrics: of the wavefronts; none of them with 0.
+        white_obstacles: leave obstacles white in the image.
+    """
+
+    def __init__(
+        self,
+        widths: Sequence[int] = (32, 32, 64, 96),
+        attention: Attention = CBAM,
+        stem: int = 16,
+        patch: int = 4,
+        metrics: int = 3,
+        white_obstacles: bool = True,
+    ) -> None:
+        super().__init__()
+        self.patch, self.stride = patch, stride_of(patch)
+        self.square = 2 * patch
+        self.white_obstacles = white_obstacles
+        width, fine = widths[0], attention.without_self_attention()
+        self.map_stem = nn.Conv2d(3, stem, patch, patch)
+        self.merge = nn.Conv2d(stem, width, 2, 2)
+        self.point_stem = nn.Conv2d(3, width, self.square, self.square)
+        self.noise_stem = nn.Conv2d(1, width, self.square, self.square)
+        self.trunk = Trunk(widths, attention)
+        self.wavefront, self.fuse = None, None
+        if metrics:
+            self.wavefront = Wavefront(width + 1, metrics)
+            self.fuse = ResidualBlock(width + 2 * metrics, width, 1, fine)
+            nn.init.constant_(self.wavefront.costs.weight[:, -1], _WALL_PRICE)
+        self.split = nn.Conv2d(width, 4 * stem, 1)
+        self.paint = nn.Sequential(
+            nn.Conv2d(stem, stem, 3, padding=1, bias=False), nn.BatchNorm2d(stem), nn.ReLU()
+        )
+        self.head = nn.Conv2d(stem, patch**2, 1)
+
+    def forward(self, map_image: Tensor, point_image: Tensor, noise: Tensor) -> Tensor:
+        """The image of the region, values in (-1, 1).
+
+        Args:
+            map_image: (B, 3, H, W) in [-1, 1], see :mod:`cbagan_ompl.network.encoding`; H and W
+                must be multiples of the stride.
+            point_image: (B, 3, H, W) in [-1, 1].
+            noise: (B, 1, H, W), standard normal in training, zero at inference.
+
+        Returns:
+            (B, 3, H, W).
+        """
+        features = self.features(
+            torch.relu(self.map_stem(map_image)),
+            self.point_stem(point_image) + self.noise_stem(noise),
+            functional.avg_pool2d(0.5 - 0.5 * map_image[:, :1], self.square),
+            squares(point_image, self.square),
+        )
+        region = torch.sigmoid(functional.pixel_shuffle(self.head(features), self.patch))
+        if self.white_obstacles:
+            region = region.masked_fill(map_image[:, :1] < 0, 0.0)
+        return region_image(region)
+
+    def features(self, of_map: Tensor, of_points: Tensor, blocked: Tensor, ends: Tensor) -> Tensor:
+        """All between the stems and the last layer.
+
+        Args:
+            of_map: (B, stem, h, w), what the stem makes of the map.
+            of_points: (B, width, h / 2, w / 2), the same of the points and the noise.
+            blocked: (B, 1, h / 2, w / 2), share of each square that obstacles have.
+            ends: (B, 2, h / 2, w / 2), see :func:`squares`.
+
+        Returns:
+            (B, stem, h, w).
+        """
+        features: Tensor = self.trunk(torch.relu(self.merge(of_map) + of_points))
+        if self.wavefront is not None and self.fuse is not None:
+            ground = torch.cat((features, blocked.to(features.dtype)), 1)
+            fronts = self.wavefront(ground, ends).to(features.dtype)
+            features = self.fuse(torch.cat((features, fronts), 1))
+        places = functional.pixel_shuffle(self.split(features), 2)
+        painted: Tensor = self.paint(torch.relu(places + of_map))
+        return painted
+
+
+def squares(point_image: Tensor, size: int) -> Tensor:
+    """The square of the start and that of the goal.
+
+    Args:
+        point_image: (B, 3, H, W), see :mod:`.encoding`.
+        size: of a square, in pixels.
+
+    Returns:
+        (B, 2, H / size, W / size), 1 where most of the spot of the start is, and of the goal.
+    """
+    height, width = point_image.size(2) // size, point_image.size(3) // size
+    tiles = point_image[:, ::2].reshape(-1, 2, height, size, width * size).sum(3)
+    brightness = tiles.reshape(-1, 2, height, width, size).sum(4)
+    return (brightness <= brightness.amin((2, 3), keepdim=True)).float()
