@@ -267,10 +267,10 @@ NETWORKS: dict[str, dict[str, Any]] = {
 PRESETS: dict[str, TrainingConfig] = {
     "best": TrainingConfig(),
     "worlds": TrainingConfig(
-        epochs=50,
+        epochs=48,
         batch_size=16,
         warmup=0.05,
-        widths=(32, 32, 64, 96),
+        widths=(32, 48, 64, 96),
         patch=4,
         metrics=3,
         white_obstacles=True,

@@ -38,7 +38,7 @@ class PatchGenerator(nn.Module):
 
     def __init__(
         self,
-        widths: Sequence[int] = (32, 32, 64, 96),
+        widths: Sequence[int] = (32, 48, 64, 96),
         attention: Attention = CBAM,
         stem: int = 16,
         patch: int = 4,
@@ -54,6 +54,9 @@ class PatchGenerator(nn.Module):
         self.merge = nn.Conv2d(stem, width, 2, 2)
         self.point_stem = nn.Conv2d(3, width, self.square, self.square)
         self.noise_stem = nn.Conv2d(1, width, self.square, self.square)
+        # Noise drowns the rest unless it begins silent.
+        nn.init.zeros_(self.noise_stem.weight)
+        self.norm = nn.BatchNorm2d(width)
         self.trunk = Trunk(widths, attention)
         self.wavefront, self.fuse = None, None
         if metrics:
@@ -101,7 +104,8 @@ class PatchGenerator(nn.Module):
         Returns:
             (B, stem, h, w).
         """
-        features: Tensor = self.trunk(torch.relu(self.merge(of_map) + of_points))
+        half = torch.relu(self.norm(self.merge(of_map) + of_points))
+        features: Tensor = self.trunk(half)
         if self.wavefront is not None and self.fuse is not None:
             ground = torch.cat((features, blocked.to(features.dtype)), 1)
             fronts = self.wavefront(ground, ends).to(features.dtype)
