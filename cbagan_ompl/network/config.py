@@ -267,7 +267,7 @@ NETWORKS: dict[str, dict[str, Any]] = {
 PRESETS: dict[str, TrainingConfig] = {
     "best": TrainingConfig(),
     "worlds": TrainingConfig(
-        epochs=48,
+        epochs=44,
         batch_size=16,
         warmup=0.05,
         widths=(32, 48, 64, 96),

@@ -54,8 +54,8 @@ class PatchGenerator(nn.Module):
         self.merge = nn.Conv2d(stem, width, 2, 2)
         self.point_stem = nn.Conv2d(3, width, self.square, self.square)
         self.noise_stem = nn.Conv2d(1, width, self.square, self.square)
-        # Noise drowns the rest unless it begins silent.
-        nn.init.zeros_(self.noise_stem.weight)
+        # At full strength noise drowns the map, for its weights never shrink to nothing.
+        self.noise_gain = 0.1
         self.norm = nn.BatchNorm2d(width)
         self.trunk = Trunk(widths, attention)
         self.wavefront, self.fuse = None, None
@@ -83,7 +83,7 @@ class PatchGenerator(nn.Module):
         """
         features = self.features(
             torch.relu(self.map_stem(map_image)),
-            self.point_stem(point_image) + self.noise_stem(noise),
+            self.point_stem(point_image) + self.noise_stem(self.noise_gain * noise),
             functional.avg_pool2d(0.5 - 0.5 * map_image[:, :1], self.square),
             squares(point_image, self.square),
         )
