@@ -127,6 +127,22 @@ def test_the_recipes_weights_reach_the_segmentation_loss(dataset: Dataset) -> No
     assert parts["segmentation"] == pytest.approx(expected)
 
 
+@pytest.mark.parametrize("limit", [0.0, 0.01])
+def test_long_gradients_are_shortened(dataset: Dataset, limit: float) -> None:
+    config = TINY.updated({"clip_norm": limit})
+    networks = Networks(config, CPU)
+    batch = make_batch(dataset.train, np.arange(4), CPU)
+    images = encode(batch)
+    fake = networks.generator(images.map, images.points, torch.zeros_like(batch.free))
+    generator_step(networks, config, batch, images, fake, None)
+    gradients = [w.grad for w in networks.generator.parameters() if w.grad is not None]
+    norm = float(torch.linalg.vector_norm(torch.cat([g.flatten() for g in gradients])))
+    if limit:
+        assert norm == pytest.approx(limit, rel=1e-3)
+    else:
+        assert norm > 0.01, "or the other case would show nothing"
+
+
 def test_average_follows_the_generator() -> None:
     networks = Networks(TINY, CPU)
     with torch.no_grad():

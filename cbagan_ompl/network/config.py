@@ -29,6 +29,9 @@ class TrainingConfig:
         beta1: decay of the optimisers' first moment.
         beta2: decay of the optimisers' second moment.
         weight_decay: decoupled decay (AdamW); with 0 the optimiser is plain Adam.
+        clip_norm: gradients of the generator longer than this are shortened to it; 0 turns it off.
+            Those of wavefronts are tens of times as long as usual now and then, and Adam takes
+            hundreds of steps to recover from one.
         schedule: ``one-cycle`` (linear warm-up, then a half cosine to 0) or ``exponential``.
         warmup: share of the steps that the warm-up of ``one-cycle`` takes.
         decay: factor on the learning rates after each epoch of ``exponential``.
@@ -80,6 +83,7 @@ class TrainingConfig:
     beta1: float = 0.9
     beta2: float = 0.999
     weight_decay: float = 0.01
+    clip_norm: float = 0.0
     schedule: str = "one-cycle"
     warmup: float = 0.1
     decay: float = 0.95
@@ -141,7 +145,7 @@ class TrainingConfig:
         self._check("validation_fraction", 0 < self.validation_fraction < 1, "between 0 and 1")
         for field in fields(self):
             if field.name.endswith(
-                ("_weight", "_decay", "_smooth", "_alpha", "_patience", "metrics", "seed")
+                ("_weight", "_decay", "_smooth", "_norm", "_alpha", "_patience", "metrics", "seed")
             ):
                 self._check(field.name, getattr(self, field.name) >= 0, "at least 0")
         self._check("seed", self.seed < 2**63, "below 2**63")
@@ -267,9 +271,10 @@ NETWORKS: dict[str, dict[str, Any]] = {
 PRESETS: dict[str, TrainingConfig] = {
     "best": TrainingConfig(),
     "worlds": TrainingConfig(
-        epochs=44,
+        epochs=38,
         batch_size=16,
         warmup=0.05,
+        clip_norm=2.0,
         widths=(32, 48, 64, 96),
         patch=4,
         metrics=3,

@@ -90,7 +90,7 @@ def generator_step(
         config.adversarial_weight,
         config.pixel_weight,
     )
-    _descend(loss, networks.optimizers["generator"])
+    _descend(loss, networks.optimizers["generator"], config.clip_norm)
     for judge in judges:
         judge.requires_grad_(True)
     return networks.group.means({name: value.item() for name, value in parts.items()})
@@ -110,7 +110,10 @@ def adversarial_shares(config: TrainingConfig, errors: Mapping[str, float]) -> t
     )
 
 
-def _descend(loss: Tensor, optimizer: torch.optim.Optimizer) -> None:
+def _descend(loss: Tensor, optimizer: torch.optim.Optimizer, clip_norm: float = 0.0) -> None:
     optimizer.zero_grad()
     loss.backward()  # type: ignore[no-untyped-call]
+    if clip_norm:
+        weights = [weight for group in optimizer.param_groups for weight in group["params"]]
+        torch.nn.utils.clip_grad_norm_(weights, clip_norm)
     optimizer.step()
