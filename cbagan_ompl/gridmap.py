@@ -241,6 +241,16 @@ class GridMap:
         return GridMap(free, self.resolution, self.origin, name=name)
 
     @cached_property
+    def clearance(self) -> NDArray[np.float32]:
+        """Distance from each pixel to the nearest blocked one, pixels, (H, W); 0 where blocked.
+
+        From centre to centre, within two hundredths; what lies outside of the map does not count.
+        """
+        # The quick mask is near enough for what asks, and a third of the price of the exact one.
+        distance = cv2.distanceTransform(self.free.view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+        return np.asarray(distance, np.float32)
+
+    @cached_property
     def components(self) -> NDArray[np.int32]:
         """Label of the connected free part that each pixel belongs to, (H, W); 0 where blocked.
 

@@ -19,7 +19,6 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields
 from math import floor
 
-import cv2
 import numpy as np
 
 from .errors import ConfigError
@@ -196,10 +195,8 @@ class Tree:
         self._width, self._height = grid.width, grid.height
         self.cells = bytearray(grid.width * grid.height)
         self._covered = np.frombuffer(self.cells, np.uint8).reshape(grid.shape)
-        # Quick to within a hundredth, which is near enough here.
-        clearance = cv2.distanceTransform(grid.free.view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
         farthest = min(reach / grid.resolution, 2.0**16 - 1)
-        self._half = np.minimum(clearance, farthest).astype(np.uint16)
+        self._half = np.minimum(grid.clearance, farthest).astype(np.uint16)
 
     def add(self, x: float, y: float) -> int | None:
         """Note a node at (x, y), world; the row-major number of its pixel if it is new ground."""
