@@ -344,6 +344,7 @@ def test_scaled_shape_keeps_the_aspect() -> None:
     assert scaled_shape((30, 40), 64) == (48, 64)
     assert scaled_shape((64, 20), 64) == (64, 20)
     assert scaled_shape((1000, 3), 64) == (64, 1)
+    assert scaled_shape((20, 10), 64) == (40, 20), "doubled at most"
 
 
 def test_scaling_keeps_narrow_passages() -> None:

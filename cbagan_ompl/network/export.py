@@ -165,7 +165,7 @@ point discriminator, exported as TorchScript on {record["date"]} with torch {rec
 - Output: {record["outputs"]}
 - Parameters: {record["parameters"]:,}
 - Maps are scaled to {record["working_size"]} pixels on the longer side, the size of the training
-  images.
+  images; small ones to twice their size.
 
 ## Data
 

@@ -23,6 +23,10 @@ if TYPE_CHECKING:
 # is certain that there is nothing.
 _FLOOR = 1e-4
 
+# Small maps are enlarged to so many times their size at most: more shows the network nothing new,
+# and costs the square of it.
+_MOST_ENLARGED = 2
+
 
 def load_model(path: str | PathLike[str] | None = None) -> Predictor:
     """Load an exported model, ready to predict.
@@ -82,7 +86,7 @@ class Predictor:
 
         Args:
             grid: the map, of any size. For the network its longer side is scaled to the model's
-                ``working_size``, and the result back again.
+                ``working_size`` (small maps to twice their size), and the result back again.
             start: (x, y), world.
             goal: (x, y), world.
             repair: join the parts of the region where it falls apart between start and goal, see
@@ -136,8 +140,11 @@ class Predictor:
 
 
 def scaled_shape(shape: tuple[int, int], longest: int) -> tuple[int, int]:
-    """Rows and columns of a map whose longer side is scaled to ``longest`` pixels."""
-    factor = longest / max(shape)
+    """Rows and columns of a map whose longer side is scaled to ``longest`` pixels.
+
+    It is doubled at most.
+    """
+    factor = min(longest / max(shape), _MOST_ENLARGED)
     return max(1, round(factor * shape[0])), max(1, round(factor * shape[1]))
 
 
