@@ -8,7 +8,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from .attention import CBAM, Attention
+from .attention import Attention
 from .blocks import ResidualBlock, Trunk, stride_of
 from .encoding import region_image
 from .wavefront import Wavefront
@@ -38,12 +38,12 @@ class PatchGenerator(nn.Module):
 
     def __init__(
         self,
-        widths: Sequence[int] = (32, 48, 64, 96),
-        attention: Attention = CBAM,
-        stem: int = 16,
-        patch: int = 4,
-        metrics: int = 3,
-        white_obstacles: bool = True,
+        widths: Sequence[int],
+        attention: Attention,
+        stem: int,
+        patch: int,
+        metrics: int,
+        white_obstacles: bool,
     ) -> None:
         super().__init__()
         self.patch, self.stride = patch, stride_of(patch)

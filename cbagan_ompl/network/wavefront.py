@@ -28,7 +28,7 @@ class Wavefront(nn.Module):
         steps: limit of the steps until the fronts stand still.
     """
 
-    def __init__(self, channels: int, metrics: int, steps: int = 160) -> None:
+    def __init__(self, channels: int, metrics: int, steps: int = 320) -> None:
         super().__init__()
         self.costs = nn.Conv2d(channels, 4 * metrics, 1)
         self.steps = steps
