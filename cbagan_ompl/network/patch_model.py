@@ -30,7 +30,6 @@ class PatchModel(nn.Module):
         self.window = 3
         self.reach = SPOT_RADIUS + 0.5
         self.map_stem = _of_free_space(generator.map_stem)
-        self.head = _as_linear(generator.head)
         with torch.no_grad():
             white = generator.point_stem(torch.ones(1, 3, self.square, self.square))
             silence = generator.noise_stem(torch.zeros(1, 1, self.square, self.square))
@@ -61,11 +60,7 @@ class PatchModel(nn.Module):
             paste(spot, ends[:, end : end + 1], corner)
         blocked = 1 - functional.avg_pool2d(free, self.square)
         features = self.generator.features(of_map, of_points, blocked, ends)
-        tiles = torch.sigmoid(self.head(features.permute(0, 2, 3, 1)))
-        tiles = tiles.view(batch, height, width, self.patch, self.patch)
-        probability = tiles.transpose(2, 3).reshape(free.size())
-        if self.generator.white_obstacles:
-            probability = probability.masked_fill(free < 0.5, 0.0)
+        probability: Tensor = self.generator.region(features, free < 0.5)
         return probability
 
 
@@ -91,13 +86,3 @@ def _of_free_space(stem: nn.Conv2d) -> nn.Linear:
         reading.weight.copy_(2 * stem.weight.sum(1).flatten(1))
         reading.bias.copy_(stem.bias - stem.weight.sum((1, 2, 3)))
     return reading
-
-
-def _as_linear(conv: nn.Conv2d) -> nn.Linear:
-    """A 1x1 convolution as a layer that reads places whose channels come last."""
-    assert conv.bias is not None
-    linear = nn.Linear(conv.in_channels, conv.out_channels)
-    with torch.no_grad():
-        linear.weight.copy_(conv.weight.flatten(1))
-        linear.bias.copy_(conv.bias)
-    return linear
