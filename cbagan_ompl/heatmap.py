@@ -57,8 +57,9 @@ class Heatmap:
                 f"this one has {raw.shape}"
             )
         scaled = _to_unit_range(raw)
-        scaled[~grid.free] = 0
-        if not scaled.any():
+        scaled *= grid.free
+        support = np.flatnonzero(scaled > 0)
+        if not len(support):
             raise HeatmapError(
                 f"the heat map is 0 on all free space of {grid.name}: there is nothing to draw; "
                 "use Heatmap.uniform where nothing is known"
@@ -66,7 +67,7 @@ class Heatmap:
         scaled.setflags(write=False)
         self.values: NDArray[np.float32] = scaled
         self.grid = grid
-        self._support = np.flatnonzero(scaled)
+        self._support = support
 
     @classmethod
     def load(cls, path: str | PathLike[str], grid: GridMap) -> Heatmap:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import torch
 from torch import Tensor, nn
@@ -10,13 +11,15 @@ from torch.nn import functional
 
 from .attention import Attention, AttentionBlock
 
-#: Generators halve their features this many times.
-STAGES = 4
 
+def stride_of(patch: int, widths: Sequence[int]) -> int:
+    """What the height and the width of a generator's images are multiples of.
 
-def stride_of(patch: int) -> int:
-    """What the height and the width of a generator's images are multiples of."""
-    return int(patch * 2**STAGES)
+    Args:
+        patch: side of what the generator reads as one place, in pixels.
+        widths: channels after each of its stages on the way down, of which each halves the size.
+    """
+    return int(patch * 2 ** len(widths))
 
 
 class ResidualBlock(nn.Module):
@@ -89,29 +92,30 @@ class UpBlock(nn.Module):
 
 
 class Trunk(nn.Module):
-    """The stages after the first one: three down, three up, from half the size to half the size.
+    """The stages after the first one, down and up again: from half the size to half the size.
 
     Args:
-        widths: channels after each of the four stages on the way down; the way up mirrors them.
+        widths: channels after each of the stages on the way down, the first one included; the way
+            up mirrors them.
         attention: see :class:`AttentionBlock`. Self-attention, for SAGAN, is left out where the
             features have half of the side.
     """
 
     def __init__(self, widths: Sequence[int], attention: Attention) -> None:
         super().__init__()
-        one, two, three, four = widths
-        self.down2 = ResidualBlock(one, two, 2, attention)
-        self.down3 = ResidualBlock(two, three, 2, attention)
-        self.down4 = ResidualBlock(three, four, 2, attention)
-        self.up4 = UpBlock(four, three, attention)
-        self.up3 = UpBlock(three, two, attention)
-        self.up2 = UpBlock(two, one, attention.without_self_attention())
+        steps = list(pairwise(widths))
+        self.downs = nn.ModuleList(ResidualBlock(*step, 2, attention) for step in steps)
+        self.ups = nn.ModuleList(
+            UpBlock(below, above, attention if level else attention.without_self_attention())
+            for level, (above, below) in reversed(list(enumerate(steps)))
+        )
 
     def forward(self, half: Tensor) -> Tensor:
         """(B, widths[0], h, w) -> the same shape."""
-        quarter = self.down2(half)
-        eighth = self.down3(quarter)
-        features = self.up4(self.down4(eighth), eighth)
-        features = self.up3(features, quarter)
-        result: Tensor = self.up2(features, half)
-        return result
+        skips = [half]
+        for down in self.downs:
+            skips.append(down(skips[-1]))
+        features = skips.pop()
+        for up in self.ups:
+            features = up(features, skips.pop())
+        return features

@@ -16,7 +16,7 @@ from .generator import Generator
 from .networks import make_generator
 from .patch_generator import PatchGenerator
 
-SCHEMA = 2
+SCHEMA = 3
 LAST, BEST = "last.pt", "best.pt"
 
 

@@ -38,7 +38,7 @@ class TrainingConfig:
         plateau_patience: epochs without a better validation IoU after which the learning rates
             are lowered (on top of the schedule); 0 turns it off.
         plateau_factor: factor on the learning rates each time.
-        widths: channels of the generator after each of its four stages down.
+        widths: channels of the generator after each of its stages down, which halve the size.
         stem: channels of its map stem (the paper's has a point stem with as many).
         patch: side of the patches of pixels that its map stem reads as one place; with 1 it is the
             paper's generator, which reads pixels.
@@ -152,8 +152,8 @@ class TrainingConfig:
         self._check("scales", len(self.scales) > 0 and min(self.scales) >= 1, "at least 1")
 
     def _check_widths(self) -> None:
-        if len(self.widths) != 4 or min(self.widths) < 1:
-            raise ConfigError(f"widths are four positive channel counts, got {self.widths}")
+        if len(self.widths) < 2 or min(self.widths) < 1:
+            raise ConfigError(f"widths are two or more positive channel counts, got {self.widths}")
         # The queries of self-attention have an eighth of the channels.
         if self.self_attention and min(self.widths[1:]) < 8:
             raise ConfigError(
@@ -271,18 +271,18 @@ NETWORKS: dict[str, dict[str, Any]] = {
 PRESETS: dict[str, TrainingConfig] = {
     "best": TrainingConfig(),
     "worlds": TrainingConfig(
-        epochs=38,
+        epochs=40,
         batch_size=16,
         warmup=0.05,
         clip_norm=2.0,
-        widths=(32, 48, 64, 96),
+        widths=(32, 48, 64),
         patch=4,
-        metrics=3,
+        metrics=2,
         white_obstacles=True,
         adversarial_every=8,
         pixel_weight=4.0,
         dice_weight=2.0,
-        positive_weight=2.0,
+        positive_weight=3.5,
         scales=(1, 1, 1, 2),
         precision="bfloat16",
     ),

@@ -27,7 +27,7 @@ def check_trainable(side: int, config: TrainingConfig) -> None:
     Raises:
         DatasetError: it is no multiple of the networks' strides, at every scale of the recipe.
     """
-    stride = stride_of(config.patch) * lcm(*config.scales)
+    stride = stride_of(config.patch, config.widths) * lcm(*config.scales)
     if side % stride:
         raise DatasetError(
             f"the networks take images with a side that is a multiple of {stride} pixels; these "

@@ -29,6 +29,18 @@ def map_image(free: Tensor) -> Tensor:
     return (2 * free - 1).expand(-1, 3, -1, -1)
 
 
+def free_space(image: Tensor) -> Tensor:
+    """The free space of a map image: the inverse of the above.
+
+    Args:
+        image: (B, 3, H, W) in [-1, 1].
+
+    Returns:
+        (B, 1, H, W) in [0, 1], 1 where free.
+    """
+    return 0.5 + 0.5 * image[:, :1]
+
+
 def point_image(start: Tensor, goal: Tensor, height: int, width: int) -> Tensor:
     """Start and goal as an image of two soft spots.
 

@@ -25,7 +25,7 @@ class Generator(nn.Module):
     * self-attention, for SAGAN, where the features have a quarter of the side or less.
 
     Args:
-        widths: channels after each of the four stages on the way down; the way up mirrors them.
+        widths: channels after each of the stages on the way down; the way up mirrors them.
         attention: see :class:`.attention.AttentionBlock`.
         stem: channels of the map stem, of the point stem, and of the last stage.
         noise_stem: channels of the noise stem.
@@ -39,7 +39,7 @@ class Generator(nn.Module):
         noise_stem: int = 32,
     ) -> None:
         super().__init__()
-        self.stride = stride_of(1)
+        self.stride = stride_of(1, widths)
         self.map_stem = nn.Conv2d(3, stem, 3, padding=1)
         self.point_stem = nn.Conv2d(3, stem, 3, padding=1)
         self.noise_stem = nn.Conv2d(1, noise_stem, 3, padding=1)

@@ -9,14 +9,9 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from .attention import Attention
-from .blocks import ResidualBlock, Trunk, stride_of
-from .encoding import region_image
+from .blocks import Trunk, stride_of
+from .encoding import free_space, region_image
 from .wavefront import Wavefront
-
-# What a whole square of obstacles adds to the logarithm of the costs of the steps from it, before
-# anything is learned. Fronts that flow through walls teach little: without it runs take several
-# epochs to find out, and with few metrics some never do.
-_WALL_PRICE = 4.0
 
 
 class PatchGenerator(nn.Module):
@@ -28,7 +23,7 @@ class PatchGenerator(nn.Module):
     where wavefronts (:class:`.wavefront.Wavefront`) spread over the whole map.
 
     Args:
-        widths: channels of the four stages on the way down; the way up mirrors them.
+        widths: channels of the stages on the way down; the way up mirrors them.
         attention: see :class:`.attention.AttentionBlock`.
         stem: channels of the places.
         patch: P.
@@ -46,10 +41,10 @@ class PatchGenerator(nn.Module):
         white_obstacles: bool,
     ) -> None:
         super().__init__()
-        self.patch, self.stride = patch, stride_of(patch)
+        self.patch, self.stride = patch, stride_of(patch, widths)
         self.square = 2 * patch
         self.white_obstacles = white_obstacles
-        width, fine = widths[0], attention.without_self_attention()
+        width = widths[0]
         self.map_stem = nn.Conv2d(3, stem, patch, patch)
         self.merge = nn.Conv2d(stem, width, 2, 2)
         self.point_stem = nn.Conv2d(3, width, self.square, self.square)
@@ -60,9 +55,8 @@ class PatchGenerator(nn.Module):
         self.trunk = Trunk(widths, attention)
         self.wavefront, self.fuse = None, None
         if metrics:
-            self.wavefront = Wavefront(width + 1, metrics)
-            self.fuse = ResidualBlock(width + 2 * metrics, width, 1, fine)
-            nn.init.constant_(self.wavefront.costs.weight[:, -1], _WALL_PRICE)
+            self.wavefront = Wavefront(width, metrics)
+            self.fuse = nn.Conv2d(2 * metrics, width, 1)
         self.split = nn.Conv2d(width, 4 * stem, 1)
         self.paint = nn.Sequential(
             nn.Conv2d(stem, stem, 3, padding=1, bias=False), nn.BatchNorm2d(stem), nn.ReLU()
@@ -71,13 +65,14 @@ class PatchGenerator(nn.Module):
 
     def forward(self, map_image: Tensor, point_image: Tensor, noise: Tensor) -> Tensor:
         """As :meth:`.generator.Generator.forward`."""
+        free = free_space(map_image)
         features = self.features(
             torch.relu(self.map_stem(map_image)),
             self.point_stem(point_image) + self.noise_stem(self.noise_gain * noise),
-            functional.avg_pool2d(0.5 - 0.5 * map_image[:, :1], self.square),
+            1 - functional.avg_pool2d(free, self.square),
             squares(point_image, self.square),
         )
-        return region_image(self.region(features, map_image[:, :1] < 0))
+        return region_image(self.region(features, free))
 
     def features(self, of_map: Tensor, of_points: Tensor, blocked: Tensor, ends: Tensor) -> Tensor:
         """All between the stems and the last layer.
@@ -94,19 +89,18 @@ class PatchGenerator(nn.Module):
         half = torch.relu(self.norm(self.merge(of_map) + of_points))
         features: Tensor = self.trunk(half)
         if self.wavefront is not None and self.fuse is not None:
-            ground = torch.cat((features, blocked.to(features.dtype)), 1)
-            fronts = self.wavefront(ground, ends).to(features.dtype)
-            features = self.fuse(torch.cat((features, fronts), 1))
+            fronts = self.wavefront(features, blocked, ends)
+            features = torch.relu(features + self.fuse(fronts.to(features.dtype)))
         places = functional.pixel_shuffle(self.split(features), 2)
         painted: Tensor = self.paint(torch.relu(places + of_map))
         return painted
 
-    def region(self, features: Tensor, obstacles: Tensor) -> Tensor:
+    def region(self, features: Tensor, free: Tensor) -> Tensor:
         """What the last layer makes of the features: the probability of the region.
 
         Args:
             features: (B, stem, h, w), see :meth:`features`.
-            obstacles: (B, 1, H, W), true where blocked.
+            free: (B, 1, H, W) in [0, 1], 1 where free.
 
         Returns:
             (B, 1, H, W) in [0, 1].
@@ -115,8 +109,8 @@ class PatchGenerator(nn.Module):
         batch, height, width = features.size(0), features.size(2), features.size(3)
         tiles = torch.sigmoid(self.head(features.permute(0, 2, 3, 1)))
         tiles = tiles.view(batch, height, width, self.patch, self.patch).transpose(2, 3)
-        region = tiles.reshape(obstacles.size())
-        return region.masked_fill(obstacles, 0.0) if self.white_obstacles else region
+        region = tiles.reshape(free.size())
+        return region * free if self.white_obstacles else region
 
 
 def squares(point_image: Tensor, size: int) -> Tensor:

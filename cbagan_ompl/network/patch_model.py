@@ -60,7 +60,7 @@ class PatchModel(nn.Module):
             paste(spot, ends[:, end : end + 1], corner)
         blocked = 1 - functional.avg_pool2d(free, self.square)
         features = self.generator.features(of_map, of_points, blocked, ends)
-        probability: Tensor = self.generator.region(features, free < 0.5)
+        probability: Tensor = self.generator.region(features, free)
         return probability
 
 

@@ -10,13 +10,18 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
+# What a place that obstacles fill adds to the logarithm of the costs of the steps from it, before
+# anything is learned. Fronts that flow through walls teach little: without it runs take several
+# epochs to find out, and with few metrics some never do.
+_WALL_PRICE = 4.0
+
 
 class Wavefront(nn.Module):
     """Features that say how much longer than the best one the best way through each place is.
 
-    For each of C metrics a 1x1 convolution gives the cost of every step between neighbouring
-    places (8-connected); D_s and D_g are the costs of the cheapest ways from the start and from
-    the goal. With the cheapest way of all, D*, the relative detour of a place is
+    For each of C metrics a 1x1 convolution, and a price of walls, give the cost of every step
+    between neighbouring places (8-connected); D_s and D_g are the costs of the cheapest ways from
+    the start and from the goal. With the cheapest way of all, D*, the relative detour of a place is
     (D_s + D_g - D*) / (D* + 1).
 
     Fronts spread without gradients until they stand still. The gradient of a distance is the one
@@ -31,30 +36,32 @@ class Wavefront(nn.Module):
     def __init__(self, channels: int, metrics: int, steps: int = 320) -> None:
         super().__init__()
         self.costs = nn.Conv2d(channels, 4 * metrics, 1)
+        self.walls = nn.Parameter(torch.full((4 * metrics, 1, 1), _WALL_PRICE))
         self.steps = steps
 
-    def forward(self, features: Tensor, ends: Tensor) -> Tensor:
+    def forward(self, features: Tensor, blocked: Tensor, ends: Tensor) -> Tensor:
         """Two features a metric: closeness to the best way, sharp and wide.
 
         Args:
             features: (B, channels, H, W).
+            blocked: (B, 1, H, W), share of each place that obstacles have.
             ends: (B, 2, H, W), positive where the front of the start begins, and of the goal.
 
         Returns:
             (B, 2 C, H, W) in [0, 1]; 1 on the cheapest ways.
         """
-        edges = self.costs(features).float().clamp(-3.0, 6.0).exp()
-        sources = ends.permute(2, 3, 0, 1) > 0
-        height, width, batch = sources.size(0), sources.size(1), sources.size(2)
-        # Both fronts at once, places first: every operation works on long rows.
-        costs = step_costs(edges.permute(2, 3, 0, 1)).unsqueeze(4).expand(-1, -1, -1, -1, 2, -1)
-        source = sources.unsqueeze(4).expand(-1, -1, -1, -1, costs.size(5))
-        shape = [height, width, batch, 2, costs.size(5)]
-        costs, source = costs.flatten(3), source.flatten(2)
+        edges = (self.costs(features).float() + self.walls * blocked).clamp(-3.0, 6.0).exp()
+        batch, height, width = edges.size(0), edges.size(2), edges.size(3)
+        # Places first, then tasks and metrics: every operation works on long rows.
+        edges = edges.view(batch, 4, -1, height, width).permute(1, 3, 4, 0, 2)
+        costs = step_costs(edges.flatten(3))
+        begins = ends.permute(1, 2, 3, 0) > 0
+        metrics = costs.size(3) // batch
+        source = begins.unsqueeze(4).expand(-1, -1, -1, -1, metrics).flatten(3)
         distance = spread(costs.detach(), source, self.steps)
         if self.training:
             distance = with_gradients(distance, costs, source)
-        through = distance.view(shape).sum(3).permute(2, 3, 0, 1)
+        through = distance.sum(0).view(height, width, batch, metrics).permute(2, 3, 0, 1)
         best = through.amin((2, 3), keepdim=True)
         detour = (through - best) / (best + 1.0)
         return torch.cat((torch.exp2(-20.0 * detour), torch.exp2(-4.0 * detour)), 1)
@@ -64,15 +71,15 @@ def step_costs(edges: Tensor) -> Tensor:
     """The costs of the eight steps into each place, in the order of :func:`neighbours`.
 
     Args:
-        edges: (H, W, B, 4 C): of the steps between each place and the ones to its right, below it,
-            below to its right, and below to its left, C each; the same in both directions. Those
-            across corners are the root of 2 times as long.
+        edges: (4, H, W, K): of the steps between each place and the ones to its right, below it,
+            below to its right, and below to its left; the same in both directions. Those across
+            corners are the root of 2 times as long.
 
     Returns:
-        (8, H, W, B, C). From outside no front comes, whatever the step costs.
+        (8, H, W, K). From outside no front comes, whatever the step costs.
     """
-    right, below, falling, rising = edges.chunk(4, 3)
-    falling, rising = 2.0**0.5 * falling, 2.0**0.5 * rising
+    right, below = edges[0], edges[1]
+    falling, rising = 2.0**0.5 * edges[2], 2.0**0.5 * edges[3]
     steps = [
         neighbours(_framed(falling, 0.0))[0],
         neighbours(_framed(below, 0.0))[1],
@@ -87,15 +94,16 @@ def neighbours(framed: Tensor) -> list[Tensor]:
     """What lies around each place, as views.
 
     Args:
-        framed: (H + 2, W + 2, ...).
+        framed: (..., H + 2, W + 2, K).
 
     Returns:
-        Eight tensors (H, W, ...), in reading order: from above to the left to below to the right.
+        Eight tensors (..., H, W, K), in reading order: from above to the left to below to the
+        right.
     """
-    height, width = framed.size(0) - 2, framed.size(1) - 2
+    height, width = framed.size(-3) - 2, framed.size(-2) - 2
     views: list[Tensor] = []
     for down, right in [(0, 0), (0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1), (2, 2)]:
-        views.append(framed[down : down + height, right : right + width])
+        views.append(framed.narrow(-3, down, height).narrow(-2, right, width))
     return views
 
 
@@ -104,24 +112,26 @@ def spread(costs: Tensor, source: Tensor, steps: int) -> Tensor:
 
     Args:
         costs: (8, H, W, K), see :func:`step_costs`, positive.
-        source: (H, W, K), true where the ways begin.
+        source: (F, H, W, K), true where the ways of each of F fronts begin.
         steps: limit of the steps.
 
     Returns:
-        (H, W, K); 1e4 where no front has come.
+        (F, H, W, K); 1e4 where no front has come.
     """
     with torch.no_grad():
+        fronts, height, width, rows = source.size(0), source.size(1), source.size(2), source.size(3)
         # Staying is a ninth step. Two operations on the windows around all places are faster than
         # two for each step.
         staying = torch.zeros_like(costs[:1])
-        size = [3, 3, source.size(0), source.size(1), source.size(2)]
-        window_costs = torch.cat((costs[:4], staying, costs[4:])).view(size)
+        window_costs = torch.cat((costs[:4], staying, costs[4:]))
+        window_costs = window_costs.view(3, 3, 1, height, width, rows)
         far = torch.full(source.size(), 1e4, device=costs.device)
         framed = _framed(far.masked_fill(source, 0.0), 1e4)
-        row, place = framed.stride(0), framed.stride(1)
-        windows = framed.as_strided(size, [row, place, row, place, 1])
-        here = framed[1:-1, 1:-1]
-        reached, before = torch.empty_like(window_costs), torch.empty_like(far)
+        front, row, place = framed.stride(0), framed.stride(1), framed.stride(2)
+        size = [3, 3, fronts, height, width, rows]
+        windows = framed.as_strided(size, [row, place, front, row, place, 1])
+        here = framed[:, 1:-1, 1:-1]
+        reached, before = torch.empty(size, device=costs.device), torch.empty_like(far)
         for step in range(steps):
             looks = step % 4 == 0
             if looks:
@@ -144,30 +154,32 @@ def with_gradients(distance: Tensor, costs: Tensor, source: Tensor) -> Tensor:
         costs: as for :func:`spread`.
         source: as for :func:`spread`.
     """
-    height, width = distance.size(0), distance.size(1)
+    height, width = distance.size(1), distance.size(2)
+    costs = costs.unsqueeze(1).expand(-1, distance.size(0), -1, -1, -1)
     with torch.no_grad():
         candidates = torch.stack(neighbours(_framed(distance, 1e4))) + costs
         best, direction = candidates.min(0)
         stays = source | (best >= 1e4)
         places = torch.arange(height * width, device=costs.device).view(height, width, 1)
-        numbers = torch.stack(neighbours(_framed(places, 0.0)))
+        numbers = torch.stack(neighbours(_framed(places, 0.0))).unsqueeze(1)
         before = torch.where(
             stays, places, numbers.expand(costs.size()).gather(0, direction[None])[0]
         )
-    way = costs.gather(0, direction[None])[0].masked_fill(stays, 0.0).flatten(0, 1)
-    before = before.flatten(0, 1)
+    way = costs.gather(0, direction[None])[0].masked_fill(stays, 0.0).flatten(1, 2)
+    before = before.flatten(1, 2)
     length = 1
     while length < height * width:
-        way = way + way.gather(0, before)
-        before = before.gather(0, before)
+        way = way + way.gather(1, before)
+        before = before.gather(1, before)
         length *= 2
     return torch.where(distance < 1e4, way.view(distance.size()), distance)
 
 
 def _framed(values: Tensor, border: float) -> Tensor:
-    """(H, W, ...) -> (H + 2, W + 2, ...), with a value around it."""
-    shape = [values.size(0) + 2, values.size(1) + 2]
-    shape.extend(values.shape[2:])
+    """(..., H, W, K) -> (..., H + 2, W + 2, K), with a value around it."""
+    shape = list(values.shape)
+    shape[-3] += 2
+    shape[-2] += 2
     framed = torch.full(shape, border, dtype=values.dtype, device=values.device)
-    framed[1:-1, 1:-1] = values
+    framed.narrow(-3, 1, shape[-3] - 2).narrow(-2, 1, shape[-2] - 2).copy_(values)
     return framed
