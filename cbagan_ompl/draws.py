@@ -57,6 +57,12 @@ class InformedSet:
         """Lower bound on the length of a path through each point; (N, 2) -> (N,)."""
         return _nearest(points, self.starts) + _nearest(points, self.goals) - self.tolerance
 
+    def shortest_through_pixels(self, grid: GridMap) -> NDArray[np.float64]:
+        """The same for the points of each pixel: no lower one is in it; (H, W)."""
+        to_ends = _nearest_to_centres(grid, self.starts) + _nearest_to_centres(grid, self.goals)
+        # The bound changes at most twice as fast as the distance from the centre, half a diagonal.
+        return np.asarray(to_ends - (self.tolerance + np.sqrt(2) * grid.resolution))
+
 
 class DrawStream:
     """Endless draws for one planner, made in batches and handed out one by one.
@@ -254,7 +260,9 @@ class _Source:
         """Draw only inside a box."""
         # Pixels that the box cuts keep their weight, the draws outside are dropped.
         reach = self._grid.resolution * np.sqrt(0.5)
-        touching = _inside(self._centres(), low - reach, high + reach)
+        rows, columns = np.divmod(self._support, self._grid.width)
+        centres = self._grid.to_world(np.stack((columns, rows), axis=-1) + 0.5)
+        touching = _inside(centres, low - reach, high + reach)
         if not touching.any():
             raise HeatmapError(
                 f"the heat map of {self._grid.name} is 0 everywhere in the space, which spans "
@@ -328,19 +336,13 @@ class _Source:
         self._active, weights = self._support, self._weights
         if self._informed is not None:
             if self._bounds is None:
-                # The bound of no point of a pixel is lower than its centre's by more: it changes
-                # at most twice as fast as the distance from the centre, half a diagonal.
-                slack = np.sqrt(2) * self._grid.resolution
-                self._bounds = self._informed.shortest_through(self._centres()) - slack
+                bounds = self._informed.shortest_through_pixels(self._grid)
+                self._bounds = bounds.ravel()[self._support]
             inside = np.asarray(self._bounds <= best)
             if inside.any():
                 self._active = self._support[inside]
                 weights = None if weights is None else weights[inside]
         self._cumulative = None if weights is None else weights.cumsum(dtype=np.float64)
-
-    def _centres(self) -> NDArray[np.float64]:
-        rows, columns = np.divmod(self._support, self._grid.width)
-        return self._grid.to_world(np.stack((columns, rows), axis=-1) + 0.5)
 
 
 def check_draw_options(uniform_fraction: float, sharpness: float | None) -> None:
@@ -380,6 +382,13 @@ def _inside(
 def _nearest(points: NDArray[np.float64], ends: NDArray[np.float64]) -> NDArray[np.float64]:
     distances = [np.hypot(points[:, 0] - x, points[:, 1] - y) for x, y in ends.tolist()]
     return np.asarray(np.minimum.reduce(distances))
+
+
+def _nearest_to_centres(grid: GridMap, ends: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Distance of each pixel's centre from the nearest of some points, (H, W), world units."""
+    columns, rows = np.arange(grid.width) + 0.5, np.arange(grid.height)[:, None] + 0.5
+    squares = [(columns - u) ** 2 + (rows - v) ** 2 for u, v in grid.to_pixel(ends).tolist()]
+    return np.asarray(grid.resolution * np.sqrt(np.minimum.reduce(squares)))
 
 
 def _no_cost() -> float:

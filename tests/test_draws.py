@@ -82,6 +82,20 @@ def test_informed_draws_stay_in_the_ellipse(corridor: Heatmap) -> None:
     assert 0.45 < stream.draws["uniform"] / 10_100 < 0.55, "the mixture stays what it was"
 
 
+def test_no_point_of_a_pixel_is_below_the_bound_of_the_pixel() -> None:
+    grid = GridMap(np.ones((12, 20), np.bool_), resolution=0.5, origin=(3.0, -1.0, 0.6))
+    corners = grid.to_world([(4.2, 3.1), (15.0, 8.5), (18.7, 2.0)])
+    informed = InformedSet(corners[:1], corners[1:], tolerance=0.25)
+    bounds = informed.shortest_through_pixels(grid)
+    assert bounds.shape == grid.shape
+    pixels = np.random.default_rng(0).random((5000, 2)) * (grid.width, grid.height)
+    columns, rows = pixels.astype(int).T
+    above = informed.shortest_through(grid.to_world(pixels)) - bounds[rows, columns]
+    assert above.min() >= 0
+    # Half a diagonal from the centre, and twice that where both distances change together.
+    assert above.max() <= 4 * np.sqrt(0.5) * grid.resolution + 1e-9
+
+
 def test_informed_set_is_left_when_the_planner_starts_again(corridor: Heatmap) -> None:
     cost = 400.0
     stream = DrawStream(Heatmap.uniform(corridor.grid), seed=0)
