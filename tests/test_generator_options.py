@@ -15,7 +15,7 @@ from cbagan_ompl.network.config import TrainingConfig  # noqa: E402
 from cbagan_ompl.network.dataset import check_trainable  # noqa: E402
 from cbagan_ompl.network.discriminators import Discriminator  # noqa: E402
 from cbagan_ompl.network.encoding import map_image, point_image  # noqa: E402
-from cbagan_ompl.network.export import fold_shortcuts, save_script  # noqa: E402
+from cbagan_ompl.network.export import save_script  # noqa: E402
 from cbagan_ompl.network.generator import Generator  # noqa: E402
 from cbagan_ompl.network.networks import make_generator  # noqa: E402
 from cbagan_ompl.network.patch_generator import PatchGenerator, squares  # noqa: E402
@@ -152,19 +152,6 @@ def test_without_the_images_the_result_is_the_same(
         lean, full = PatchModel(model)(free, *ends), ImageModel(model)(free, *ends)
     assert full.std() > 0.1
     torch.testing.assert_close(lean, full, rtol=0, atol=1e-5)
-
-
-def test_a_folded_shortcut_is_the_same_convolution() -> None:
-    model = generator()
-    inputs = images(clutter(1, 1, 64, 64))
-    with torch.no_grad():
-        for module in model.modules():
-            if isinstance(module, torch.nn.BatchNorm2d):
-                module.running_mean.uniform_(-1, 1)
-                module.running_var.uniform_(0.5, 2)
-        expected = model(*inputs)
-        fold_shortcuts(model)
-        torch.testing.assert_close(model(*inputs), expected, rtol=0, atol=1e-5)
 
 
 def test_discriminators_see_patches_asplaces() -> None:

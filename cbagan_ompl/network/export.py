@@ -13,7 +13,6 @@ import torch
 from torch import nn
 
 from ..errors import ModelError
-from .blocks import ResidualBlock
 from .checkpoints import best_generator, load_checkpoint
 from .model_files import MANIFEST, RECORD_NAME, RECORD_SCHEMA, read_manifest, sha256
 from .region_model import RegionModel
@@ -58,7 +57,6 @@ def export(
         target.touch()
     except OSError as error:
         raise ModelError(f"cannot write {target}: {error.strerror or error}") from error
-    fold_shortcuts(generator)
     model = RegionModel(generator).eval()
     # Convolutions in this layout take four fifths of the time on a CPU.
     model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
@@ -78,33 +76,6 @@ def save_script(model: nn.Module, path: Path, record: dict[str, Any]) -> None:
         frozen = torch.jit.freeze(torch.jit.script(model))
         extra = {RECORD_NAME: json.dumps(record, indent=1)}
         torch.jit.save(frozen, str(path), _extra_files=extra)
-
-
-def fold_shortcuts(module: nn.Module) -> None:
-    """Make the pooling, 1x1 convolution and batch norm of each shortcut one convolution.
-
-    The mean of a patch and a 1x1 convolution of it are one convolution with the stride of the
-    patch, which a CPU does in a fraction of the time.
-
-    Args:
-        module: in evaluation mode; changed in place.
-    """
-    for block in module.modules():
-        if isinstance(block, ResidualBlock) and isinstance(block.shortcut, nn.Sequential):
-            block.shortcut = _folded(*block.shortcut)
-
-
-def _folded(pool: nn.AvgPool2d, conv: nn.Conv2d, norm: nn.BatchNorm2d) -> nn.Conv2d:
-    assert norm.running_mean is not None
-    assert norm.running_var is not None
-    size = int(pool.kernel_size)  # type: ignore[arg-type]
-    folded = nn.Conv2d(conv.in_channels, conv.out_channels, size, stride=size)
-    scale = norm.weight * torch.rsqrt(norm.running_var + norm.eps)
-    with torch.no_grad():
-        folded.weight.copy_(conv.weight * scale[:, None, None, None] / size**2)
-        assert folded.bias is not None
-        folded.bias.copy_(norm.bias - norm.running_mean * scale)
-    return folded
 
 
 def make_record(

@@ -61,4 +61,4 @@ class ImageModel(nn.Module):
         """As :meth:`RegionModel.forward`."""
         points = point_image(start, goal, free.size(2), free.size(3))
         image = self.generator(map_image(free), points, torch.zeros_like(free))
-        return region_probability(image).clamp(0.0, 1.0)
+        return region_probability(image)
