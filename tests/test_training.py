@@ -553,7 +553,7 @@ def test_config_file_round_trip(tmp_path: Path, suffix: str) -> None:
         ("epoch: 3", "unknown option 'epoch'"),
         ("epochs: many", "epochs must be a value of type int"),
         ("epochs: true", "epochs must be"),
-        ("widths: [4]", "widths are two or more"),
+        ("widths: [4, 4]", "widths are three or more"),
         ("schedule: none", "one-cycle, exponential"),
         ("precision: float64", "float32, bfloat16"),
         ("plateau_factor: 2", "plateau_factor must be above 0"),

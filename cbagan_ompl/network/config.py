@@ -152,8 +152,8 @@ class TrainingConfig:
         self._check("scales", len(self.scales) > 0 and min(self.scales) >= 1, "at least 1")
 
     def _check_widths(self) -> None:
-        if len(self.widths) < 2 or min(self.widths) < 1:
-            raise ConfigError(f"widths are two or more positive channel counts, got {self.widths}")
+        if len(self.widths) < 3 or min(self.widths) < 1:
+            raise ConfigError(f"widths are three or more positive numbers, got {self.widths}")
         # The queries of self-attention have an eighth of the channels.
         if self.self_attention and min(self.widths[1:]) < 8:
             raise ConfigError(

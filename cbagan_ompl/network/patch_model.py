@@ -26,7 +26,7 @@ class PatchModel(nn.Module):
         super().__init__()
         self.generator = generator
         self.patch, self.square = generator.patch, generator.square
-        # The spot of a point touches no more squares than that along a side.
+        # The spot of a point touches no more squares than that along a side, and no map has fewer.
         self.window = 3
         self.reach = SPOT_RADIUS + 0.5
         self.map_stem = _of_free_space(generator.map_stem)
