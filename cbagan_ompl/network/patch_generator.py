@@ -69,18 +69,18 @@ class PatchGenerator(nn.Module):
         features = self.features(
             torch.relu(self.map_stem(map_image)),
             self.point_stem(point_image) + self.noise_stem(self.noise_gain * noise),
-            1 - functional.avg_pool2d(free, self.square),
+            free,
             squares(point_image, self.square),
         )
         return region_image(self.region(features, free))
 
-    def features(self, of_map: Tensor, of_points: Tensor, blocked: Tensor, ends: Tensor) -> Tensor:
+    def features(self, of_map: Tensor, of_points: Tensor, free: Tensor, ends: Tensor) -> Tensor:
         """All between the stems and the last layer.
 
         Args:
             of_map: (B, stem, h, w), what the stem makes of the map.
             of_points: (B, width, h / 2, w / 2), the same of the points and the noise.
-            blocked: (B, 1, h / 2, w / 2), share of each square that obstacles have.
+            free: (B, 1, H, W) in [0, 1], 1 where free.
             ends: (B, 2, h / 2, w / 2), see :func:`squares`.
 
         Returns:
@@ -89,6 +89,7 @@ class PatchGenerator(nn.Module):
         half = torch.relu(self.norm(self.merge(of_map) + of_points))
         features: Tensor = self.trunk(half)
         if self.wavefront is not None and self.fuse is not None:
+            blocked = 1 - functional.avg_pool2d(free, self.square)
             fronts = self.wavefront(features, blocked, ends)
             features = torch.relu(features + self.fuse(fronts.to(features.dtype)))
         places = functional.pixel_shuffle(self.split(features), 2)

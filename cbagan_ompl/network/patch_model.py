@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import torch
 from torch import Tensor, nn
-from torch.nn import functional
 
 from .encoding import SPOT_RADIUS, point_image
 from .patch_generator import PatchGenerator, squares
@@ -30,19 +29,15 @@ class PatchModel(nn.Module):
         self.window = 3
         self.reach = SPOT_RADIUS + 0.5
         self.map_stem = _of_free_space(generator.map_stem)
-        self.point_stem = _of_tiles(generator.point_stem)
-        with torch.no_grad():
-            white = generator.point_stem(torch.ones(1, 3, self.square, self.square))
-            silence = generator.noise_stem(torch.zeros(1, 1, self.square, self.square))
-        self.of_silence = nn.Parameter(silence, requires_grad=False)
-        self.of_white = nn.Parameter(white + silence, requires_grad=False)
+        self.point_stem = _of_points(generator.point_stem, generator.noise_stem)
+        white = self.point_stem(torch.ones(1, 1, 1, self.point_stem.in_features))
+        self.of_white = nn.Parameter(white.detach().permute(0, 3, 1, 2), requires_grad=False)
 
     def forward(self, free: Tensor, start: Tensor, goal: Tensor) -> Tensor:
         """As :meth:`.region_model.RegionModel.forward`, for sides that the generator takes."""
         of_map = torch.relu(self.map_stem(tiles_of(free, self.patch))).permute(0, 3, 1, 2)
         of_points, ends = self.points(start, goal, of_map.size(2) // 2, of_map.size(3) // 2)
-        blocked = 1 - functional.avg_pool2d(free, self.square)
-        features = self.generator.features(of_map, of_points, blocked, ends)
+        features = self.generator.features(of_map, of_points, free, ends)
         probability: Tensor = self.generator.region(features, free)
         return probability
 
@@ -74,7 +69,6 @@ class PatchModel(nn.Module):
         shift = self.square * corners
         windows = point_image(start.repeat(2, 1) - shift, goal.repeat(2, 1) - shift, side, side)
         of_windows = self.point_stem(tiles_of(windows, self.square)).permute(0, 3, 1, 2)
-        of_windows = of_windows + self.of_silence
         spots = squares(windows, self.square)
         places: list[list[int]] = corners.long().tolist()
         for i in range(2 * batch):
@@ -101,21 +95,24 @@ def tiles_of(images: Tensor, side: int) -> Tensor:
     return split.permute(0, 2, 4, 1, 3, 5).flatten(3)
 
 
-def _of_tiles(stem: nn.Conv2d) -> nn.Linear:
-    """A stem that reads tiles, see :func:`tiles_of`."""
-    assert stem.bias is not None
-    reading = nn.Linear(stem.in_channels * stem.kernel_size[0] ** 2, stem.out_channels)
-    with torch.no_grad():
-        reading.weight.copy_(stem.weight.flatten(1))
-        reading.bias.copy_(stem.bias)
-    return reading
-
-
 def _of_free_space(stem: nn.Conv2d) -> nn.Linear:
     """A map stem that reads the pixels of a patch, 1 where free, in place of three colours."""
     assert stem.bias is not None
-    reading = nn.Linear(stem.kernel_size[0] ** 2, stem.out_channels)
+    return _reading(2 * stem.weight.sum(1), stem.bias - stem.weight.sum((1, 2, 3)))
+
+
+def _of_points(stem: nn.Conv2d, noise_stem: nn.Conv2d) -> nn.Linear:
+    """A point stem that reads tiles, with what the noise stem makes of no noise added."""
+    assert stem.bias is not None
+    assert noise_stem.bias is not None
+    return _reading(stem.weight, stem.bias + noise_stem.bias)
+
+
+def _reading(weight: Tensor, bias: Tensor) -> nn.Linear:
+    """The layer that does to the tiles of :func:`tiles_of` what a convolution does to patches."""
+    flat = weight.flatten(1)
+    reading = nn.Linear(flat.size(1), flat.size(0))
     with torch.no_grad():
-        reading.weight.copy_(2 * stem.weight.sum(1).flatten(1))
-        reading.bias.copy_(stem.bias - stem.weight.sum((1, 2, 3)))
+        reading.weight.copy_(flat)
+        reading.bias.copy_(bias)
     return reading
