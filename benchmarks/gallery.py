@@ -10,7 +10,7 @@ import argparse
 from matplotlib.figure import Figure
 
 from cbagan_ompl import GridMap, load_model, plan, tasks_of
-from cbagan_ompl.picture import draw_heatmap
+from cbagan_ompl.plotting import draw_heatmap
 
 #: Maps, and which of their tasks is shown.
 SHOWN = {"rooms": 0, "maze": 1, "warehouse": 1, "bug_trap": 0, "narrow_passage": 1, "clutter": 0}

@@ -3,7 +3,7 @@
     python benchmarks/labels.py --maps 16 --json benchmarks/results/labels.json
 
 A network can at best paint what it is taught. Here planners draw from labels themselves: from the
-exact ones of several widths (EPSILON of cbagan_ompl.datasets.worlds), and from the paper's, the
+exact ones of several widths (EPSILON of cbagan_ompl.datasets.synthetic), and from the paper's, the
 union of 50 runs of RRT. Ratios are to OMPL's own sampler, geometric means over the tasks.
 """
 
@@ -21,12 +21,12 @@ from sharpness import measure
 from tqdm import trange
 
 from cbagan_ompl import GridMap, Heatmap, plan
+from cbagan_ompl.common.files import write_json
 from cbagan_ompl.datasets.generation import ITERATIONS, RANGE, RUNS
 from cbagan_ompl.datasets.geodesic import distances
-from cbagan_ompl.datasets.worlds import WorldSettings, detour_heat, draw_world
-from cbagan_ompl.files import write_json
+from cbagan_ompl.datasets.rrt_labels import rrt_region
+from cbagan_ompl.datasets.synthetic import WorldSettings, detour_heat, draw_world
 from cbagan_ompl.planning.compat import ompl_version
-from cbagan_ompl.planning.labels import rrt_region
 
 EPSILONS = (0.01, 0.02, 0.05, 0.1)
 LONGEST_EDGE, TIME = 20.0, 0.4

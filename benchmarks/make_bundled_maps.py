@@ -1,4 +1,4 @@
-"""Draw the maps that come with the package, cbagan_ompl/maps/*.png, and write their tasks.csv.
+"""Draw the bundled maps, cbagan_ompl/maps/bundled/*.png, and write their tasks.csv.
 
 Run it from anywhere, ``python benchmarks/make_bundled_maps.py``; it always writes the same maps.
 """
@@ -14,9 +14,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cbagan_ompl.map_families import FAMILIES
+from cbagan_ompl.map_generators import FAMILIES
 
-FOLDER = Path(__file__).resolve().parents[1] / "cbagan_ompl" / "maps"
+FOLDER = Path(__file__).resolve().parents[1] / "cbagan_ompl" / "maps" / "bundled"
 SEED = 4
 SIZES = {"warehouse": (320, 192)}
 

@@ -18,8 +18,8 @@ from tqdm import trange
 from cbagan_ompl import GridMap, tasks_of
 from cbagan_ompl.benchmarking.logs import parse_log
 from cbagan_ompl.planning import compat
-from cbagan_ompl.planning.benchmark import Entrant, RunOptions, run_benchmark
 from cbagan_ompl.planning.compat import og, ou
+from cbagan_ompl.planning.ompl_benchmark import Entrant, RunOptions, run_benchmark
 from cbagan_ompl.planning.problem import Ends, simple_setup
 
 MAP, RANGE = "bundled:walls_with_gaps", 20.0

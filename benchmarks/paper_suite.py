@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
-from cbagan_ompl.datasets.layout import Dataset, load_dataset
+from cbagan_ompl.datasets.dataset import Dataset, load_dataset
 from cbagan_ompl.datasets.writing import write_csv
-from cbagan_ompl.evaluation.predictions import stored_predictions
+from cbagan_ompl.evaluation.baselines import stored_predictions
 
 STORED = "sagan_test_predictions"
 COLUMNS = ("map", "start_x", "start_y", "goal_x", "goal_y", "family")

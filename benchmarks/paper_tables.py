@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from cbagan_ompl import GridMap, Predictor, load_model, plan
-from cbagan_ompl.datasets.layout import Dataset, Tasks, load_dataset
-from cbagan_ompl.files import write_json
+from cbagan_ompl.common.files import write_json
+from cbagan_ompl.datasets.dataset import Dataset, Tasks, load_dataset
 from cbagan_ompl.planning.compat import ompl_version
 
 # The paper gives a step of 0.2 and no unit. Two pixels of the 64 give trees of the size it reports.

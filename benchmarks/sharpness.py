@@ -18,9 +18,9 @@ from matplotlib.figure import Figure
 from tqdm import trange
 
 from cbagan_ompl import GridMap, PlanResult, load_model, plan
+from cbagan_ompl.common.files import write_json
 from cbagan_ompl.datasets.geodesic import distances
-from cbagan_ompl.datasets.worlds import WorldSettings, draw_world
-from cbagan_ompl.files import write_json
+from cbagan_ompl.datasets.synthetic import WorldSettings, draw_world
 from cbagan_ompl.planning.compat import ompl_version
 
 POWERS = (0.5, 1.0, 2.0, 3.0, 4.0, 8.0)

@@ -14,12 +14,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from cbagan_ompl.datasets.layout import load_dataset
-from cbagan_ompl.files import write_json
-from cbagan_ompl.network.checkpoints import BEST, LAST, load_checkpoint
-from cbagan_ompl.network.config import TrainingConfig
-from cbagan_ompl.network.sources import DatasetSource
-from cbagan_ompl.network.training import train
+from cbagan_ompl.common.files import write_json
+from cbagan_ompl.datasets.dataset import load_dataset
+from cbagan_ompl.training.checkpoints import BEST, LAST, load_checkpoint
+from cbagan_ompl.training.config import TrainingConfig
+from cbagan_ompl.training.loop import train
+from cbagan_ompl.training.task_sources import DatasetSource
 
 SEEDS = {"cbagan": (0, 1, 2), "sa": (0,), "ca": (0,), "none": (0,), "sagan": (0, 1, 2)}
 

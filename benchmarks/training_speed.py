@@ -13,8 +13,8 @@ import time
 import numpy as np
 import torch
 
-from cbagan_ompl.network.config import TrainingConfig
-from cbagan_ompl.network.networks import make_generator, pick_device
+from cbagan_ompl.training.config import TrainingConfig
+from cbagan_ompl.training.gan import make_generator, pick_device
 
 FORMATS = {"contiguous": torch.contiguous_format, "channels-last": torch.channels_last}
 

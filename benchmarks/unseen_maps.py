@@ -29,12 +29,12 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from cbagan_ompl import GridMap, Heatmap, PlanResult, Predictor, load_model, plan
-from cbagan_ompl.benchmarking.selection import BenchmarkTask, select_tasks
-from cbagan_ompl.files import write_json
-from cbagan_ompl.network.config import TrainingConfig
-from cbagan_ompl.network.networks import make_generator
-from cbagan_ompl.network.region_model import RegionModel
+from cbagan_ompl.benchmarking.tasks import BenchmarkTask, select_tasks
+from cbagan_ompl.common.files import write_json
+from cbagan_ompl.networks.export_model import RegionModel
 from cbagan_ompl.planning.compat import ompl_version
+from cbagan_ompl.training.config import TrainingConfig
+from cbagan_ompl.training.gan import make_generator
 
 RANGE, TIME = 20.0, 2.0
 Ends = tuple[NDArray[np.float64], NDArray[np.float64]]

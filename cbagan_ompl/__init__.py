@@ -23,22 +23,22 @@ from .errors import (
     PlannerError,
     TaskError,
 )
-from .gridmap import GridMap
-from .heatmap import Heatmap
-from .mapfiles import bundled_maps
-from .tasks import Task, load_tasks, tasks_of
+from .maps.grid_map import GridMap
+from .maps.loading import bundled_maps
+from .maps.tasks import Task, load_tasks, tasks_of
+from .sampling.heatmap import Heatmap
 
 if TYPE_CHECKING:
-    from .network.predictor import Predictor, load_model
+    from .inference.predictor import Predictor, load_model
     from .planning.attach import Attachment, attach
     from .planning.hooks import reached_planners
-    from .planning.plan import PlanResult, plan
-    from .planning.samplers import (
+    from .planning.ompl_samplers import (
         HeatmapStateSampler,
         HeatmapValidStateSampler,
         state_sampler_allocator,
         valid_state_sampler_allocator,
     )
+    from .planning.plan import PlanResult, plan
     from .planning.validity import GridMotionValidator, GridValidityChecker
 
 __version__ = "0.1.0"
@@ -75,11 +75,11 @@ __all__ = [
 ]
 
 _HOMES = {
-    "network.predictor": ("Predictor", "load_model"),
+    "inference.predictor": ("Predictor", "load_model"),
     "planning.attach": ("Attachment", "attach"),
     "planning.hooks": ("reached_planners",),
     "planning.plan": ("PlanResult", "plan"),
-    "planning.samplers": (
+    "planning.ompl_samplers": (
         "HeatmapStateSampler",
         "HeatmapValidStateSampler",
         "state_sampler_allocator",

@@ -10,10 +10,9 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 import pytest
+from helpers.tasks import GOAL, START
 
 from cbagan_ompl import GridMap, Heatmap
-
-START, GOAL = (10.0, 10.0), (240.0, 240.0)
 
 
 @pytest.fixture(scope="session")

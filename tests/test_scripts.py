@@ -8,11 +8,11 @@ import sys
 from pathlib import Path
 
 import pytest
-from test_evaluation import store
+from helpers.predictions import store
 
-from cbagan_ompl.benchmarking.selection import heatmap_file, select_tasks
+from cbagan_ompl.benchmarking.tasks import heatmap_file, select_tasks
+from cbagan_ompl.datasets.dataset import load_dataset
 from cbagan_ompl.datasets.generation import GenerationSettings, generate
-from cbagan_ompl.datasets.layout import load_dataset
 
 SCRIPTS = Path(__file__).resolve().parents[1] / "benchmarks"
 
@@ -52,7 +52,7 @@ def test_paper_suite(folder: Path, tmp_path: Path) -> None:
 
 def test_paper_tables(folder: Path, tmp_path: Path) -> None:
     pytest.importorskip("torch")
-    from cbagan_ompl.network.model_files import bundled_model
+    from cbagan_ompl.inference.model_files import bundled_model
 
     report = tmp_path / "tables.json"
     words = [str(folder), "--model", f"bundled={bundled_model()}", "--runs", "2", "--tasks", "3"]

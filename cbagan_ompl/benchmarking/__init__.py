@@ -1,5 +1,5 @@
-"""The benchmark runner: which tasks, in which processes, and what the results mean.
+"""Benchmarks: which tasks, in which processes, and what the results mean.
 
-What drives OMPL is in :mod:`cbagan_ompl.planning.benchmark`; nothing here imports ompl itself. Data
-flows one way: tasks -> one OMPL log for each -> database, statistics, report, plots.
+Data flows one way: tasks -> one OMPL log for each -> database, statistics, report, plots. What
+drives OMPL is in :mod:`cbagan_ompl.planning.ompl_benchmark`; nothing here imports ompl itself.
 """

@@ -12,9 +12,9 @@ from .logs import parse_log
 from .plots import save_plots
 from .report import Circumstances, markdown, summary_json
 from .runner import run_jobs
-from .selection import BenchmarkTask
 from .settings import Settings
 from .statistics import results_of
+from .tasks import BenchmarkTask
 from .worker import Job, check_heatmaps, check_job
 
 _SETTINGS, _LOGS = "settings.json", "logs"

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from .logs import GEOMETRIC, ExperimentLog, PlannerLog, number
 
 if TYPE_CHECKING:
-    from ..planning.benchmark import RunRecord
+    from ..planning.ompl_benchmark import RunRecord
 
 #: Property of a run: making the heat map and attaching it, seconds.
 INFERENCE = "inference time REAL"

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from math import isfinite
 from typing import Any
 
-from ..markdown import table
+from ..common.markdown import table
 from .settings import BASELINE, Settings
 from .statistics import Interval, Results, Summary
 

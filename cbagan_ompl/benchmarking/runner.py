@@ -13,14 +13,14 @@ from typing import cast
 
 from tqdm import tqdm
 
-from ..processes import fork_server, interrupts_held
+from ..common.parallel import fork_server, interrupts_held
 from .settings import LEARNED
 from .worker import Job, run_job
 
 # Imported once, by the server that the processes are forked from.
 _PRELOAD = ("cbagan_ompl.benchmarking.worker",)
 # Torch takes a second, and our modules import it only once it is needed.
-_PRELOAD_LEARNED = ("cbagan_ompl.network.predictor", "torch")
+_PRELOAD_LEARNED = ("cbagan_ompl.inference.predictor", "torch")
 
 # An interrupt that another thread took, or that came just before a wait, does not end the wait.
 _LOOK_AGAIN_S = 0.5

@@ -11,10 +11,10 @@ from typing import Any
 
 import yaml
 
-from ..checks import check_at_least
-from ..draws import DEFAULT_UNIFORM_FRACTION, check_draw_options
+from ..common.validation import check_at_least
 from ..errors import ConfigError
-from ..trust import ADAPTATION_PARTS, Adaptation
+from ..sampling.adaptation import ADAPTATION_PARTS, Adaptation
+from ..sampling.sampler import DEFAULT_UNIFORM_FRACTION, check_draw_options
 
 #: OMPL's own sampler, which the others are compared with.
 BASELINE = "uniform"
@@ -38,7 +38,7 @@ class Settings:
         parameters: for some planners ``{parameter: value}``.
         uniform_fraction: share of draws that stays uniform over free space, in (0, 1].
         adaptation: names of the parts of the adaptation that are on, see
-            :mod:`cbagan_ompl.trust`.
+            :mod:`cbagan_ompl.sampling.adaptation`.
         sharpness: power of the heat maps that draws follow; by default what suits each planner,
             see :func:`cbagan_ompl.attach`.
         models: for some samplers the file of the model that they draw from; the bundled one for

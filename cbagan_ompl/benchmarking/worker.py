@@ -8,14 +8,14 @@ from pathlib import Path
 from zlib import crc32
 
 from ..errors import ConfigError
-from ..heatmap import Heatmap
-from ..planning.benchmark import Entrant, RunOptions, check_entrants, run_benchmark
+from ..planning.ompl_benchmark import Entrant, RunOptions, check_entrants, run_benchmark
 from ..planning.plan import SAMPLERS, Provider, heatmap_provider
-from ..trust import Adaptation
+from ..sampling.adaptation import Adaptation
+from ..sampling.heatmap import Heatmap
 from .logs import ExperimentLog, format_log, join_logs, parse_log
 from .measures import FAMILY, MAP, add_measures
-from .selection import BenchmarkTask, heatmap_file
 from .settings import LEARNED, Settings
+from .tasks import BenchmarkTask, heatmap_file
 
 
 @dataclass(frozen=True)

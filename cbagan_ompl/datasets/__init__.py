@@ -1,1 +1,1 @@
-"""Training sets: their layout on disk, making new ones, and how noisy their labels are."""
+"""Training sets: reading, writing, importing and generating them, and their labels."""

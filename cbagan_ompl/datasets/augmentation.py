@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..map_families import without_pockets
+from ..map_generators import without_pockets
 
 #: Height and width shift of the paper's table, in pixels, in steps of 1.
 SHIFT = 2

@@ -15,18 +15,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import check_at_least, check_share, require
+from ..common.files import write_json
+from ..common.parallel import run_all
+from ..common.validation import check_at_least, check_share, require
 from ..errors import ConfigError, DatasetError
-from ..files import write_json
-from ..gridmap import GridMap
-from ..heatmap import REGION_BORDER, pixel_pair
-from ..map_families import FAMILIES, MIN_SIDE, check_families
-from ..map_families.variation import world_map
+from ..map_generators import FAMILIES, MIN_SIDE, check_families
+from ..map_generators.randomization import world_map
+from ..maps.grid_map import GridMap
+from ..sampling.heatmap import REGION_BORDER, pixel_pair
 from .augmentation import augmented
-from .layout import Tasks
-from .pool import run_all
+from .dataset import Tasks
 from .splits import is_test_task
-from .worlds import HARD_DETOUR, detour_heat
+from .synthetic import HARD_DETOUR, detour_heat
 from .writing import Row, task_row, write_lists, write_map, write_tasks
 
 RECORD = "dataset.json"
@@ -52,14 +52,15 @@ class GenerationSettings:
         maps: number of maps.
         tasks: on each map.
         size: side of the maps in pixels.
-        families: names from :data:`cbagan_ompl.map_families.FAMILIES`, taken in turn.
-        varied: scale, turn and wear each original, see :mod:`cbagan_ompl.map_families.variation`.
+        families: names from :data:`cbagan_ompl.map_generators.FAMILIES`, taken in turn.
+        varied: scale, turn and wear each original, see
+            :mod:`cbagan_ompl.map_generators.randomization`.
         copies: maps from each original; the first is the original itself, the others are
             augmented (10 in the paper).
         label: ``rrt``, the union of the paths of many runs, as in the paper; or ``geodesic``, the
-            region of :func:`cbagan_ompl.datasets.worlds.detour_heat`.
+            region of :func:`cbagan_ompl.datasets.synthetic.detour_heat`.
         hard_share: share of tasks whose shortest way is at least
-            :data:`cbagan_ompl.datasets.worlds.HARD_DETOUR` times as long as the straight line,
+            :data:`cbagan_ompl.datasets.synthetic.HARD_DETOUR` times as long as the straight line,
             where a map has such tasks; the others are as they come.
         runs: of RRT for each label.
         range: longest edge of RRT in pixels; None for ``size`` / 64.
@@ -255,7 +256,7 @@ def _label(
         start, goal = pixel_pair(ends)
         fields = distances(grid.free, start), distances(grid.free, goal)
         return detour_heat(*fields, goal) >= REGION_BORDER
-    from ..planning.labels import rrt_region
+    from .rrt_labels import rrt_region
 
     task = grid.check_task(*ends)
     return rrt_region(grid, task, settings.runs, settings.longest_edge, ITERATIONS, seed)

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import check_at_least
+from ..common.validation import check_at_least
 from ..errors import ConfigError, DatasetError
 from ..evaluation.metrics import joins
-from .layout import Dataset, Tasks, load_dataset
+from .dataset import Dataset, Tasks, load_dataset
 from .splits import is_test_task
 from .writing import task_row, write_lists, write_map, write_tasks
 
@@ -27,7 +27,7 @@ def read_set(path: Path) -> Dataset:
     """The set in a folder, or in an archive (.tar, .tar.gz, .zip) that holds it in any folder.
 
     Raises:
-        DatasetError: it cannot be read, see :func:`cbagan_ompl.datasets.layout.load_dataset`, or
+        DatasetError: it cannot be read, see :func:`cbagan_ompl.datasets.dataset.load_dataset`, or
             the archive holds no set or several.
     """
     if path.is_dir():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import check_at_least
+from ..common.validation import check_at_least
 from ..errors import ConfigError
 
 SPLITS = ("task", "map")

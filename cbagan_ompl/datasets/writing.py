@@ -1,4 +1,4 @@
-"""Writing training sets in the published layout, see :mod:`cbagan_ompl.datasets.layout`."""
+"""Writing training sets in the published layout, see :mod:`cbagan_ompl.datasets.dataset`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DatasetError
-from .layout import COLUMNS, Tasks
+from .dataset import COLUMNS, Tasks
 
 #: Columns of ``tasks/map_K.csv``: row and column of start and goal, and their distance.
 TASK_COLUMNS = ("istart", "jstart", "igoal", "jgoal", "euclid")

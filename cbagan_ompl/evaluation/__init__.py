@@ -1,1 +1,1 @@
-"""Scores of predicted regions, next to predictors that know nothing."""
+"""Scores of predicted regions, next to trivial baselines."""

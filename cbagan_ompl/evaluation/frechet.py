@@ -97,8 +97,8 @@ def inception_features(
         MissingDependencyError: torch is not installed.
         ModelError: the file cannot be used so.
     """
-    from ..network import require_torch
-    from ..network.model_files import load_script
+    from ..common.validation import require_torch
+    from ..inference.model_files import load_script
 
     require_torch()
     import torch

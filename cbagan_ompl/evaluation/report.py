@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..markdown import table
-from .evaluate import Evaluation
+from ..common.markdown import table
+from .evaluator import Evaluation
 
 _COLUMNS = {
     "iou": "IoU",

@@ -1,1 +1,1 @@
-"""The OMPL side: adapters, hooks and whole jobs. Nothing else in the package imports ompl."""
+"""OMPL: planners that sample from a heat map. Nothing else imports ompl."""

@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from ..draws import DEFAULT_UNIFORM_FRACTION, OPTIMIZING_SHARPNESS, DrawStream
 from ..errors import PlannerError
-from ..heatmap import Heatmap
-from ..trust import FULL_ADAPTATION, Adaptation, Trust
-from . import compat, samplers
+from ..sampling.adaptation import FULL_ADAPTATION, Adaptation, Trust
+from ..sampling.heatmap import Heatmap
+from ..sampling.sampler import DEFAULT_UNIFORM_FRACTION, OPTIMIZING_SHARPNESS, DrawStream
+from . import compat
+from . import ompl_samplers as samplers
 from .compat import ob, ou
 from .goal_injection import InjectedGoal
 from .hooks import (
@@ -24,8 +25,8 @@ from .hooks import (
     VALID_STATE_SAMPLER,
     hook_of,
 )
-from .positions import Positions, bounds_of, positions_of
-from .progress import PlannerProgress, is_followed
+from .monitor import PlannerProgress, is_followed
+from .states import Positions, bounds_of, positions_of
 
 # OMPL's range of a planner that was given none, as a share of the extent of the space.
 _OMPL_RANGE = 0.2
@@ -95,10 +96,10 @@ def attach(
         uniform_fraction: share of draws that stays uniform over free space, in (0, 1].
         seed: seed or generator of the draws; seed OMPL as well for repeatable plans.
         adaptation: how the share of the heat map changes while the planner plans, see
-            :mod:`cbagan_ompl.trust`; for planners that goal injection reaches.
+            :mod:`cbagan_ompl.sampling.adaptation`; for planners that goal injection reaches.
         sharpness: power of the heat map that the density of the draws is proportional to. By
             default 1 for planners that stop at their first path, and
-            :data:`cbagan_ompl.draws.OPTIMIZING_SHARPNESS` for those that go on.
+            :data:`cbagan_ompl.sampling.sampler.OPTIMIZING_SHARPNESS` for those that go on.
 
     Returns:
         A handle with ``.hook``, ``.draws`` and ``.detach()``.

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..draws import DrawStream
-from ..trust import Trust
+from ..sampling.adaptation import Trust
+from ..sampling.sampler import DrawStream
 from .compat import ob
-from .positions import Positions
-from .progress import PlannerProgress
+from .monitor import PlannerProgress
+from .states import Positions
 
 # What RRT-like planners compare their number of goal states with: never enough.
 _ENDLESS = 10**9

@@ -14,20 +14,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..draws import DEFAULT_UNIFORM_FRACTION, check_draw_options
 from ..errors import ConfigError
-from ..gridmap import GridMap
-from ..heatmap import Heatmap
-from ..trust import FULL_ADAPTATION, Adaptation
+from ..maps.grid_map import GridMap
+from ..sampling.adaptation import FULL_ADAPTATION, Adaptation
+from ..sampling.heatmap import Heatmap
+from ..sampling.sampler import DEFAULT_UNIFORM_FRACTION, check_draw_options
 from . import compat
 from .attach import attach
 from .compat import ou
 from .hooks import STOP_AT_FIRST, hook_of
+from .monitor import CostHistory
 from .problem import checked_path, path_length, set_range, simple_setup
-from .progress import CostHistory
 
 if TYPE_CHECKING:
-    from ..network.predictor import Predictor
+    from ..inference.predictor import Predictor
 
 #: Where the heat map of a plan can come from; "uniform" is OMPL's own sampler, untouched.
 SAMPLERS = ("learned", "uniform", "corridor", "straight-line")
@@ -154,7 +154,7 @@ def plan(
             paths end in the goal itself.
         keep_tree: put the edges of the planner's tree into the result.
         adaptation: how the share of the heat map changes while the planner plans, see
-            :mod:`cbagan_ompl.trust`.
+            :mod:`cbagan_ompl.sampling.adaptation`.
         sharpness: power of the heat map that draws follow; by default what suits the planner, see
             :func:`attach`.
 
@@ -296,7 +296,7 @@ def heatmap_provider(
         return sampler, Heatmap.corridor
     if sampler == "straight-line":
         return sampler, Heatmap.straight_line
-    from ..network.predictor import Predictor, load_model
+    from ..inference.predictor import Predictor, load_model
 
     predictor = model if isinstance(model, Predictor) else load_model(model)
     return sampler, predictor.predict

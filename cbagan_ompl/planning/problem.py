@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ConfigError
-from ..gridmap import GridMap
+from ..maps.grid_map import GridMap
 from . import compat
 from .compat import og
 from .validity import GridMotionValidator, GridValidityChecker

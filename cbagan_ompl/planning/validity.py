@@ -6,10 +6,10 @@ from math import floor
 from typing import Any
 
 from ..errors import PlannerError
-from ..gridmap import GridMap
-from ..segments import segment_is_free
+from ..maps.collision import segment_is_free
+from ..maps.grid_map import GridMap
 from .compat import ob
-from .positions import Positions, positions_of
+from .states import Positions, positions_of
 
 _LAST_VALID_PRECISION = 1e-3
 
@@ -48,9 +48,9 @@ class GridMotionValidator(ob.MotionValidator):  # type: ignore[misc]
     """A motion is valid when every pixel that its segment passes through is free.
 
     One call walks the pixels exactly, corners included
-    (:func:`cbagan_ompl.segments.segment_is_free`): no step width, so no wall is too thin. It is
-    for spaces whose motions are straight in (x, y), RealVectorStateSpace and SE2StateSpace; not
-    for Dubins and Reeds-Shepp curves, where OMPL's own validator with a
+    (:func:`cbagan_ompl.maps.collision.segment_is_free`): no step width, so no wall is too thin.
+    It is for spaces whose motions are straight in (x, y), RealVectorStateSpace and SE2StateSpace;
+    not for Dubins and Reeds-Shepp curves, where OMPL's own validator with a
     :class:`GridValidityChecker` is the one to use.
 
     Use: ``si.setMotionValidator(GridMotionValidator(si, grid))``.

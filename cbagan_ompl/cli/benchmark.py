@@ -1,0 +1,210 @@
+"""The command ``benchmark``."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shlex
+import sys
+from pathlib import Path
+from typing import Any
+
+from ..benchmarking.settings import LEARNED, Settings, parse_parameters
+from ..common.validation import check_at_least
+from ..errors import ConfigError
+from ..maps.loading import bundled_maps
+from .options import add_draw_options, add_map_options, map_options
+
+_HELP = """\
+Compare samplers in OMPL's own planners, with OMPL's Benchmark, on the same tasks.
+
+MAP is what `plan` takes; without any, the bundled maps are used ({maps}).
+`@FILE` stands for the arguments in FILE, one a line: so a benchmark can be kept in a file.
+
+The output folder holds, when all is done:
+
+  logs/MAP_N.log    OMPL's log of each task, with further properties of the runs
+  benchmark.db      SQLite, for Planner Arena and OMPL's scripts
+  summary.json      medians and ratios with 95 % intervals, over all tasks and by kind of map
+  summary.md        the same to be read
+  *.png, *.pdf      plots
+
+Exit status: 0 done, 1 some tasks failed, 2 bad input, 130 interrupted (go on with --resume).
+"""
+
+
+def add_benchmark_parser(commands: Any) -> None:
+    """Add the command ``benchmark``; its ``run`` default takes the parsed arguments."""
+    defaults = Settings()
+    parser = commands.add_parser(
+        "benchmark",
+        help="compare samplers on many tasks",
+        description=_HELP.format(maps=", ".join(bundled_maps())),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        fromfile_prefix_chars="@",
+    )
+    parser.set_defaults(run=_benchmark)
+    parser.add_argument("maps", nargs="*", metavar="MAP", help="map file, or bundled:NAME")
+
+    tasks = parser.add_argument_group("tasks")
+    tasks.add_argument(
+        "--tasks",
+        metavar="FILE",
+        help="tasks for the maps: .csv (map,start_x,start_y,goal_x,goal_y[,optimal_cost,"
+        "family]) or MovingAI .scen (default: those that come with a map, otherwise random ones)",
+    )
+    tasks.add_argument(
+        "--tasks-per-map",
+        type=int,
+        metavar="N",
+        help="at most N of each map, spread over its list (default: all; 4 random ones)",
+    )
+    tasks.add_argument(
+        "--radius", type=float, default=0.0, metavar="R", help="radius of the robot (default: 0)"
+    )
+    add_map_options(tasks)
+
+    contest = parser.add_argument_group("what is compared")
+    contest.add_argument(
+        "--planners",
+        type=_names,
+        default=defaults.planners,
+        metavar="A,B",
+        help=f"OMPL's names (default: {','.join(defaults.planners)})",
+    )
+    contest.add_argument(
+        "--samplers",
+        type=_names,
+        default=defaults.samplers,
+        metavar="A,B",
+        help="uniform (OMPL's own), learned, corridor (around a grid search's path), straight-line "
+        f"(default: {','.join(defaults.samplers)})",
+    )
+    contest.add_argument(
+        "--heatmap-dir",
+        action="append",
+        default=[],
+        type=_named_folder,
+        metavar="NAME=DIR",
+        help="a further sampler NAME, which draws from heat maps of any origin: "
+        "DIR/MAP_N.npy or .png for task N of each map, from 0; may be repeated",
+    )
+    contest.add_argument(
+        "--model",
+        action="append",
+        default=[],
+        type=_model,
+        metavar="[NAME=]FILE",
+        help="exported model of the learned sampler (default: the bundled one); with a name, a "
+        "further sampler NAME that draws from this model; may be repeated",
+    )
+    add_draw_options(contest)
+    contest.add_argument(
+        "--range",
+        type=float,
+        metavar="R",
+        help="longest edge of all planners that have it (default: OMPL's choice)",
+    )
+    contest.add_argument(
+        "--set",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="PLANNER.parameter=value",
+        help="call a setter of a planner: RRTstar.rewire_factor=1.2 is setRewireFactor(1.2)",
+    )
+
+    effort = parser.add_argument_group("how much")
+    effort.add_argument(
+        "--runs",
+        type=int,
+        default=defaults.runs,
+        metavar="N",
+        help=f"of each planner with each sampler on each task (default: {defaults.runs})",
+    )
+    effort.add_argument(
+        "--time",
+        type=float,
+        default=defaults.time,
+        metavar="S",
+        help=f"limit of a run in seconds (default: {defaults.time})",
+    )
+    effort.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="of OMPL and of the draws (default: 0)"
+    )
+    effort.add_argument(
+        "--jobs",
+        type=int,
+        default=_cores(),
+        metavar="N",
+        help="tasks at a time, each in a process (default: the number of cores)",
+    )
+
+    output = parser.add_argument_group("output")
+    output.add_argument("--output", required=True, metavar="DIR", help="folder of the results")
+    output.add_argument(
+        "--resume", action="store_true", help="go on in a folder: only tasks without a log are run"
+    )
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(text.split(","))
+
+
+def _named_folder(text: str) -> tuple[str, str]:
+    name, _, folder = text.partition("=")
+    if not name or not Path(folder).is_dir() or not folder:
+        raise argparse.ArgumentTypeError(f"expected NAME=DIR with a folder DIR, got {text!r}")
+    return name, folder
+
+
+def _model(text: str) -> tuple[str, str]:
+    name, equals, file = text.partition("=")
+    return (name, file) if equals and not Path(text).exists() else (LEARNED, text)
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0))
+
+
+def _benchmark(args: argparse.Namespace) -> int:
+    from ..benchmarking.benchmark import Benchmark, write_results
+    from ..benchmarking.tasks import select_tasks
+
+    check_at_least("jobs", args.jobs, 1)
+    if args.jobs > _cores():
+        print(
+            f"warning: {args.jobs} jobs share {_cores()} cores, all times will be too long",
+            file=sys.stderr,
+        )
+    folders, models = dict(args.heatmap_dir), dict(args.model)
+    further = [name for name in models if name not in args.samplers]
+    if LEARNED in further:
+        raise ConfigError(
+            f"--model {models[LEARNED]}: the learned sampler is not among the samplers"
+        )
+    settings = Settings(
+        planners=args.planners,
+        samplers=(*args.samplers, *further, *folders),
+        runs=args.runs,
+        time=args.time,
+        range=args.range,
+        parameters=parse_parameters(args.set),
+        uniform_fraction=args.uniform_fraction,
+        adaptation=args.adaptation,
+        sharpness=args.sharpness,
+        models=models,
+        heatmap_dirs=folders,
+        radius=args.radius,
+        seed=args.seed,
+    )
+    tasks = select_tasks(
+        args.maps, args.tasks, args.tasks_per_map, args.radius, args.seed, map_options(args)
+    )
+    benchmark = Benchmark(tasks, settings, Path(args.output), args.resume)
+    failures = benchmark.run(args.jobs)
+    logs = benchmark.finished_logs()
+    if logs:
+        command = shlex.join(["cbagan-ompl", *sys.argv[1:]])
+        print(write_results(logs, settings, failures, benchmark.folder, command))
+    return 1 if failures else 0

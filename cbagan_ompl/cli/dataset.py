@@ -1,0 +1,243 @@
+"""The command ``dataset``; none of it needs torch."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from ..common.files import write_json
+from ..common.validation import check_at_least
+from ..datasets.generation import LABELS, RANGE, RUNS, GenerationSettings, generate
+from ..datasets.importing import KEEP, described, read_set, write_dataset
+from ..datasets.splits import SPLITS
+from ..datasets.synthetic import HARD_DETOUR
+from ..errors import ConfigError
+from ..map_generators import FAMILIES
+
+_HELP = """\
+Training sets: check and split one that is there, make a new one, measure how noisy labels are.
+
+A set is a folder with maps/, tasks/, train.csv and test.csv, as the paper's was published.
+"""
+
+_IMPORT_HELP = """\
+Read a training set, check all of its files, and say what is in it.
+
+PATH is a folder or an archive (.tar.gz, .zip). With --output a clean copy is written, whose lists
+can be made anew: the paper's set is split by task, so that every test map is in training too;
+
+  cbagan-ompl dataset import mpr.tar.gz --output mpr-by-map --split map --copies 10
+
+puts each original map with its ten copies on one side.
+"""
+
+_GENERATE_HELP = """\
+Make a training set: random maps, tasks on them, and labels, by many runs of RRT or exact ones.
+
+  cbagan-ompl dataset generate --output mine --maps 100 --tasks 100 --copies 10
+  cbagan-ompl train mine --output runs/mine
+
+The same seed gives the same files, whatever --jobs (with one version of OMPL).
+"""
+
+_NOISE_HELP = """\
+Label the test tasks of a set anew, several times, and compare the labels.
+
+RRT is random, and so are its labels: how well they agree says how well a network can do at most.
+"""
+
+
+def add_dataset_parser(commands: Any) -> None:
+    """Add the command ``dataset``; the ``run`` defaults take the parsed arguments."""
+    parser = commands.add_parser(
+        "dataset", help="make, import and examine training sets", description=_HELP
+    )
+    actions = parser.add_subparsers(required=True, metavar="ACTION")
+    _add_import(actions)
+    _add_generate(actions)
+    _add_noise(actions)
+
+
+def _action(actions: Any, name: str, help: str, description: str) -> argparse.ArgumentParser:
+    parser: argparse.ArgumentParser = actions.add_parser(
+        name,
+        help=help,
+        description=description,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--json", metavar="FILE", help="write what is printed as JSON")
+    return parser
+
+
+def _add_import(actions: Any) -> None:
+    parser = _action(actions, "import", "check a set, and split it anew", _IMPORT_HELP)
+    parser.set_defaults(run=_import)
+    parser.add_argument("path", metavar="PATH", help="folder or archive")
+    parser.add_argument("--output", metavar="DIR", help="write a copy there")
+    parser.add_argument(
+        "--split",
+        choices=(KEEP, *SPLITS),
+        default=KEEP,
+        help="lists of the copy: as they are, by single tasks, or by original maps (default: keep)",
+    )
+    _add_split_options(parser)
+
+
+def _add_generate(actions: Any) -> None:
+    defaults = GenerationSettings()
+    parser = _action(actions, "generate", "make a set", _GENERATE_HELP)
+    parser.set_defaults(run=_generate)
+    parser.add_argument("--output", required=True, metavar="DIR", help="folder of the set")
+    _add_number(parser, "--maps", defaults.maps, "number of maps")
+    _add_number(parser, "--tasks", defaults.tasks, "on each map")
+    side = "side of the maps in pixels; training takes multiples of 16"
+    _add_number(parser, "--size", defaults.size, side)
+    parser.add_argument(
+        "--families",
+        type=lambda text: tuple(text.split(",")),
+        default=defaults.families,
+        metavar="A,B",
+        help=f"kinds of maps, taken in turn (default: all: {','.join(FAMILIES)})",
+    )
+    parser.add_argument(
+        "--varied", action="store_true", help="scale, turn and wear the maps at random"
+    )
+    hard = f"share of tasks whose way is {HARD_DETOUR} times as long as the straight line, or more"
+    _add_number(parser, "--hard-share", defaults.hard_share, hard)
+    parser.add_argument(
+        "--label",
+        choices=LABELS,
+        default=defaults.label,
+        help="rrt: where many runs of RRT pass; geodesic: where paths pass that are not much "
+        f"longer than the shortest (default: {defaults.label})",
+    )
+    distance = "from start to goal, as a share of the side"
+    _add_number(parser, "--min-distance", defaults.min_distance, distance)
+    parser.add_argument(
+        "--split",
+        choices=SPLITS,
+        default=defaults.split,
+        help=f"test tasks by original maps, or by single tasks (default: {defaults.split})",
+    )
+    _add_split_options(parser)
+    _add_label_options(parser)
+    parser.add_argument(
+        "--resume", action="store_true", help="go on with a set that was interrupted"
+    )
+
+
+def _add_noise(actions: Any) -> None:
+    parser = _action(actions, "noise", "measure how noisy labels are", _NOISE_HELP)
+    parser.set_defaults(run=_noise)
+    parser.add_argument("dataset", metavar="DATASET", help="folder or archive of a set")
+    parser.add_argument(
+        "--tasks", type=int, metavar="N", help="only N of the test tasks, chosen by the seed"
+    )
+    _add_number(parser, "--seed", 0, "")
+    _add_label_options(parser)
+
+
+def _add_split_options(parser: argparse.ArgumentParser) -> None:
+    copies = "maps from each original, by shift, shear and rotation; 10 in the paper"
+    _add_number(parser, "--copies", 1, copies)
+    fraction = "share of the tasks, or of the original maps, for testing"
+    _add_number(parser, "--test-fraction", 0.2, fraction)
+    _add_number(parser, "--seed", 0, "")
+
+
+def _add_label_options(parser: argparse.ArgumentParser) -> None:
+    _add_number(parser, "--runs", RUNS, "of RRT for each label")
+    parser.add_argument(
+        "--range",
+        type=float,
+        metavar="R",
+        help=f"longest edge of RRT in pixels (default: the side / {1 / RANGE:g})",
+    )
+    _add_number(parser, "--jobs", 1, "processes at a time")
+
+
+def _add_number(
+    parser: argparse.ArgumentParser, name: str, default: int | float, what: str
+) -> None:
+    """Add an option for a number of the type that its default has."""
+    parser.add_argument(
+        name,
+        type=type(default),
+        default=default,
+        metavar="N" if isinstance(default, int) else "F",
+        help=f"{what} (default: {default})".lstrip(),
+    )
+
+
+def _import(args: argparse.Namespace) -> int:
+    if args.output is None and args.split != KEEP:
+        raise ConfigError("a new split is written with a copy of the set: give --output as well")
+    dataset = read_set(Path(args.path))
+    values = described(dataset)
+    if args.output is not None:
+        write_dataset(
+            Path(args.output), dataset, args.split, args.copies, args.test_fraction, args.seed
+        )
+    print(
+        f"{values['name']}: {values['train_tasks']} tasks for training, {values['test_tasks']} for "
+        f"testing, on {values['maps']} maps of {values['side']} x {values['side']} pixels\n"
+        f"  maps with tasks in both lists:       {values['shared_maps']}\n"
+        f"  test tasks that are in training too: {values['repeated_tasks']}\n"
+        f"  labels that join start and goal:     {values['joined']:.2%}\n"
+        f"  region, share of free space:         {values['region_share']:.1%}\n"
+        f"  tasks with a blocked start or goal:  {values['blocked_ends']}"
+    )
+    if args.output is not None:
+        print(f"copied to {args.output}, split: {args.split}")
+    if args.json is not None:
+        write_json(args.json, values)
+    return 0
+
+
+def _generate(args: argparse.Namespace) -> int:
+    settings = GenerationSettings(
+        maps=args.maps,
+        tasks=args.tasks,
+        size=args.size,
+        families=args.families,
+        varied=args.varied,
+        copies=args.copies,
+        label=args.label,
+        hard_share=args.hard_share,
+        runs=args.runs,
+        range=args.range,
+        min_distance=args.min_distance,
+        split=args.split,
+        test_fraction=args.test_fraction,
+        seed=args.seed,
+    )
+    check_at_least("jobs", args.jobs, 1)
+    try:
+        generate(Path(args.output), settings, args.jobs, args.resume)
+    except KeyboardInterrupt:
+        print("interrupted; go on with the same command and --resume", file=sys.stderr)
+        return 130
+    print(f"{settings.maps * settings.tasks} tasks written to {args.output}")
+    if args.json is not None:
+        write_json(args.json, described(read_set(Path(args.output))))
+    return 0
+
+
+def _noise(args: argparse.Namespace) -> int:
+    from ..evaluation.label_noise import chosen_tasks, label_noise
+
+    check_at_least("jobs", args.jobs, 1)
+    tasks = read_set(Path(args.dataset)).test
+    if args.tasks is not None:
+        tasks = chosen_tasks(tasks, args.tasks, args.seed)
+    longest_edge = tasks.side * RANGE if args.range is None else args.range
+    values = label_noise(tasks, args.runs, longest_edge, args.seed, args.jobs)
+    print(f"agreement of labels on {len(tasks)} tasks, {args.runs} runs of RRT each")
+    for name, scores in values.items():
+        if isinstance(scores, dict):
+            print(f"  {name:28} IoU {scores['iou']:.3f}  Dice {scores['dice']:.3f}")
+    if args.json is not None:
+        write_json(args.json, values)
+    return 0

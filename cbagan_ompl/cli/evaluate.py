@@ -1,0 +1,158 @@
+"""The command ``evaluate``."""
+
+from __future__ import annotations
+
+import argparse
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..common.files import write_json
+from ..common.validation import check_at_least
+from ..errors import ConfigError
+
+if TYPE_CHECKING:
+    from ..datasets.dataset import Tasks
+    from ..evaluation.evaluator import Evaluation
+
+_HELP = """\
+Score models on the tasks of a training set, next to predictors that know nothing.
+
+  cbagan-ompl evaluate --dataset DATASET
+  cbagan-ompl evaluate --dataset DATASET --model mine.pt --model other.pt --output scores
+
+All scores are those of the region alone: pixels that lie outside both regions are not counted, so
+that an empty prediction scores 0. In brackets 95 % bootstrap intervals (of maps, and of tasks on
+them). "joined" is the share of tasks whose start and goal the predicted region joins in free space.
+The Frechet distance is an FID only with --inception.
+
+The output folder gets evaluation.json, evaluation.md and a picture of each model's best, middling
+and worst cases.
+"""
+
+
+def add_evaluate_parser(commands: Any) -> None:
+    """Add the command ``evaluate``; its ``run`` default takes the parsed arguments."""
+    parser = commands.add_parser(
+        "evaluate",
+        help="score models on a training set's tasks",
+        description=_HELP,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.set_defaults(run=_evaluate)
+    parser.add_argument("--dataset", required=True, metavar="DIR", help="folder of the set")
+    parser.add_argument(
+        "--model",
+        action="append",
+        metavar="FILE",
+        help="exported model; may be repeated (default: the bundled one)",
+    )
+    parser.add_argument(
+        "--predictions",
+        action="append",
+        default=[],
+        metavar="NAME=DIR",
+        help="stored pictures of regions, green on white, with a results.csv (columns true_roi, "
+        "pred_roi) or named as the labels; may be repeated",
+    )
+    parser.add_argument(
+        "--split", choices=("test", "train"), default="test", help="which tasks (default: test)"
+    )
+    parser.add_argument(
+        "--inception",
+        metavar="FILE",
+        help="TorchScript file of an Inception network (uint8 images (B, 3, 299, 299) to (B, F)), "
+        "which makes the Frechet distance an FID",
+    )
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="of the intervals (default: 0)"
+    )
+    parser.add_argument("--output", metavar="DIR", help="folder for the results and pictures")
+    parser.add_argument("--json", metavar="FILE", help="write the scores as JSON")
+
+
+def _evaluate(args: argparse.Namespace) -> int:
+    from ..datasets.dataset import load_dataset
+    from ..evaluation.baselines import stored_predictions, trivial_predictions
+    from ..evaluation.evaluator import Evaluator
+    from ..evaluation.frechet import INCEPTION_NAME, OWN_NAME, inception_features, region_features
+    from ..evaluation.report import markdown
+    from ..inference.predictor import load_model
+
+    check_at_least("seed", args.seed, 0)
+    stored = [_named(text) for text in args.predictions]
+    models = [load_model(path) for path in args.model or [None]]
+    names = [str(model.record["name"]) for model in models] + [name for name, _ in stored]
+    dataset = load_dataset(args.dataset)
+    tasks = dataset.test if args.split == "test" else dataset.train
+    trivial = trivial_predictions(tasks)
+    _check_names([*names, *trivial])
+    if args.output is not None:
+        _make_folder(Path(args.output))
+    features, frechet_name = region_features, OWN_NAME
+    if args.inception is not None:
+        features, frechet_name = partial(inception_features, path=args.inception), INCEPTION_NAME
+    evaluator = Evaluator(tasks, features, args.seed)
+    evaluations = [
+        *(
+            evaluator.evaluate_model(name, model)
+            for name, model in zip(names, models, strict=False)
+        ),
+        *(
+            evaluator.evaluate(name, stored_predictions(folder, Path(args.dataset), args.split))
+            for name, folder in stored
+        ),
+        *(evaluator.evaluate(name, regions) for name, regions in trivial.items()),
+    ]
+    table = markdown(evaluations, frechet_name)
+    print(f"{len(tasks)} {args.split} tasks of {dataset.name}\n\n{table}")
+    result = {
+        "dataset": dataset.description(),
+        "split": args.split,
+        "seed": args.seed,
+        "frechet": frechet_name,
+        "predictions": {one.name: one.to_dict() for one in evaluations},
+    }
+    if args.json is not None:
+        write_json(args.json, result)
+    if args.output is not None:
+        _save(Path(args.output), result, table, evaluations[: len(names)], tasks)
+    return 0
+
+
+def _named(text: str) -> tuple[str, Path]:
+    name, _, folder = text.partition("=")
+    if not name or not folder:
+        raise ConfigError(f"--predictions takes NAME=DIR, got {text!r}")
+    return name, Path(folder)
+
+
+def _check_names(names: list[str]) -> None:
+    twice = {name for name in names if names.count(name) > 1}
+    if twice:
+        raise ConfigError(f"two predictions are called {', '.join(sorted(twice))!r}")
+    for name in names:
+        # A picture is called after each, and the table has a line for it.
+        if any(character in name for character in "/\\|\n\0"):
+            raise ConfigError(f"a prediction cannot be called {name!r}; choose a plainer name")
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(f"cannot make the folder {folder}: {error.strerror or error}") from error
+
+
+def _save(
+    folder: Path, result: dict[str, Any], table: str, evaluations: list[Evaluation], tasks: Tasks
+) -> None:
+    from ..evaluation.sample_grid import save_contact_sheet
+
+    try:
+        (folder / "evaluation.md").write_text(table, encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"cannot write to {folder}: {error.strerror or error}") from error
+    write_json(str(folder / "evaluation.json"), result)
+    for one in evaluations:
+        save_contact_sheet(one, tasks, folder / f"{one.name}.png")

@@ -1,0 +1,176 @@
+"""The command ``plan``."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from ..common.files import check_folder, write_json
+from ..errors import ConfigError
+from ..maps.grid_map import GridMap
+from ..maps.loading import bundled_maps
+from ..maps.tasks import tasks_of
+from ..sampling.adaptation import Adaptation
+from ..sampling.heatmap import Heatmap
+from .options import add_draw_options, add_map_options, map_options
+
+_PLAN_HELP = """\
+Plan a path on a map with one of OMPL's planners.
+
+The map is a PNG, JPG, BMP or PGM image (dark pixels are obstacles), a ROS map_server YAML, a
+MovingAI .map, or one of the bundled maps: {maps}.
+
+Coordinates are pixels, x right and y down from the upper left corner, or metres in the frame of
+a ROS map. Exit status: 0 solved, 1 no exact solution in time, 2 bad input.
+"""
+
+
+def add_plan_parser(commands: Any) -> None:
+    """Add the command ``plan``; its ``run`` default takes the parsed arguments."""
+    parser = commands.add_parser(
+        "plan",
+        help="plan a path on a map",
+        description=_PLAN_HELP.format(maps=", ".join(f"bundled:{name}" for name in bundled_maps())),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.set_defaults(run=_plan)
+    parser.add_argument("map", metavar="MAP", help="map file, or bundled:NAME")
+
+    task = parser.add_argument_group("task")
+    task.add_argument("--start", type=_point, metavar="X,Y", help="where the path begins")
+    task.add_argument("--goal", type=_point, metavar="X,Y", help="where it ends")
+    task.add_argument(
+        "--task",
+        type=int,
+        metavar="N",
+        help="number of a task that comes with the map, from 0: a bundled map's, or a line of the "
+        "MovingAI .scen beside it (default: 0 when no start and goal are given)",
+    )
+    task.add_argument(
+        "--radius", type=float, default=0.0, metavar="R", help="radius of the robot (default: 0)"
+    )
+    add_map_options(task)
+
+    planner = parser.add_argument_group("planner")
+    planner.add_argument(
+        "--planner", default="RRTstar", metavar="NAME", help="OMPL's name (default: RRTstar)"
+    )
+    planner.add_argument(
+        "--time", type=float, default=1.0, metavar="S", help="limit in seconds (default: 1)"
+    )
+    planner.add_argument("--iterations", type=int, metavar="N", help="limit of iterations")
+    planner.add_argument(
+        "--range", type=float, metavar="R", help="longest edge (default: OMPL's choice)"
+    )
+    planner.add_argument(
+        "--simplify", action="store_true", help="shorten the path with OMPL's path simplifier"
+    )
+    planner.add_argument("--seed", type=int, metavar="N", help="seed (default: a fresh one)")
+
+    sampler = parser.add_argument_group("sampler")
+    sampler.add_argument(
+        "--sampler",
+        default="learned",
+        metavar="NAME",
+        help="learned, uniform (OMPL's own), corridor (around a grid search's path) or "
+        "straight-line (default: learned)",
+    )
+    sampler.add_argument("--model", metavar="FILE", help="exported model (default: the bundled)")
+    sampler.add_argument(
+        "--heatmap", metavar="FILE", help="draw from this image or .npy instead of a model's"
+    )
+    add_draw_options(sampler)
+
+    output = parser.add_argument_group("output")
+    output.add_argument("--output", metavar="FILE", help="picture of the plan (.png, .pdf, .svg)")
+    output.add_argument("--json", metavar="FILE", help="result as JSON")
+
+
+def _point(text: str) -> tuple[float, float]:
+    try:
+        x, y = (float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"expected two numbers as X,Y, such as 12.5,-40; got {text!r}"
+        ) from None
+    return x, y
+
+
+def _plan(args: argparse.Namespace) -> int:
+    from ..planning.plan import plan
+    from ..plotting import check_picture_path, save_picture
+
+    if args.output is not None:
+        check_picture_path(args.output)
+    check_folder(args.output)
+    grid = GridMap.load(args.map, **map_options(args))
+    start, goal = _ends(args, grid)
+    result = plan(
+        grid,
+        start,
+        goal,
+        planner=args.planner,
+        sampler=args.sampler,
+        time=args.time,
+        iterations=args.iterations,
+        range=args.range,
+        radius=args.radius,
+        seed=args.seed,
+        uniform_fraction=args.uniform_fraction,
+        adaptation=Adaptation.of(args.adaptation),
+        sharpness=args.sharpness,
+        model=args.model,
+        heatmap=None if args.heatmap is None else Heatmap.load(args.heatmap, grid),
+        simplify=args.simplify,
+        keep_tree=args.output is not None,
+    )
+    values = result.to_dict()
+    if args.json is not None:
+        write_json(args.json, values)
+    if args.output is not None:
+        save_picture(result, grid, args.output)
+    _print_summary(values, args.output)
+    return 0 if result.solved else 1
+
+
+def _ends(
+    args: argparse.Namespace, grid: GridMap
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    if args.start is not None and args.goal is not None and args.task is None:
+        return args.start, args.goal
+    if args.start is not None or args.goal is not None:
+        raise ConfigError("give both --start and --goal, or --task alone")
+    tasks = tasks_of(args.map, grid)
+    number = args.task or 0
+    if not 0 <= number < len(tasks):
+        have = f"tasks 0 to {len(tasks) - 1}" if tasks else "no tasks of its own"
+        raise ConfigError(
+            f"{grid.name} comes with {have}"
+            + (f", there is no task {number}" if args.task is not None else "")
+            + ": give --start X,Y and --goal X,Y"
+        )
+    return tasks[number].start, tasks[number].goal
+
+
+def _print_summary(values: dict[str, Any], picture: str | None) -> None:
+    solved = f"yes, cost {values['cost']:.6g}" if values["solved"] else f"no ({_why(values)})"
+    first = values["first_solution_s"]
+    rows = {
+        "solved": solved,
+        "planner": f"{values['planner']}, OMPL {values['ompl_version']}",
+        "sampler": f"{values['sampler']}, hook {values['hook'] or 'none'}",
+        "draws": f"{values['draws']['learned']} learned, {values['draws']['uniform']} uniform",
+        "nodes": values["nodes"],
+        "inference": f"{values['inference_s']:.4f} s",
+        "planning": f"{values['planning_s']:.4f} s"
+        + ("" if first is None else f", first solution after {first:.4f} s"),
+        "seed": values["seed"],
+        **({"picture": picture} if picture else {}),
+    }
+    for name, value in rows.items():
+        print(f"{name:<14} {value}")
+
+
+def _why(values: dict[str, Any]) -> str:
+    exact = values["status"] == "Exact solution"
+    return "its path failed the check" if exact else values["status"]

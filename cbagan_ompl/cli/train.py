@@ -1,0 +1,252 @@
+"""The commands ``train`` and ``export``; running them needs torch, importing this does not."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any
+
+import yaml
+
+from ..common.files import write_json
+from ..common.validation import check_at_least, require_torch
+from ..datasets.dataset import load_dataset
+from ..datasets.synthetic import HARD_DETOUR, TASKS_PER_MAP, WorldSettings
+from ..errors import ConfigError
+from ..training.config import NETWORKS, PRESETS, TrainingConfig
+from ..training.task_sources import DatasetSource, TaskSource, WorldSchedule, world_source
+
+_TRAIN_HELP = """\
+Train the networks on a data set or on worlds without end, and keep the best epoch.
+
+DATASET is a folder with train.csv, test.csv, maps/ and tasks/. With --worlds in its place maps of
+all families are drawn and labelled exactly while the networks learn, new ones in every epoch. After
+each epoch the output folder holds last.pt (to go on from with --resume), best.pt (to export) and
+log.jsonl (the scores).
+
+  cbagan-ompl train DATASET --output runs/first
+  cbagan-ompl train --worlds --preset worlds --output runs/worlds
+  cbagan-ompl export runs/first/best.pt --output models/first.pt
+  cbagan-ompl plan MAP --model models/first.pt
+
+Several processes, on one machine or more, share the work when torchrun starts them:
+
+  torchrun --nproc-per-node 4 -m cbagan_ompl.cli train DATASET --output runs/first
+"""
+
+_EXPORT_HELP = """\
+Turn a training checkpoint into a model file that `plan --model` takes.
+
+Beside the model go a model card (.md) and its SHA-256 in manifest.json. Scores on the test tasks
+are in the card once the training run has come to its end.
+"""
+
+
+def add_train_parser(subparsers: Any) -> None:
+    """Add the command ``train``; its ``run`` default takes the parsed arguments."""
+    parser = subparsers.add_parser(
+        "train",
+        help="train the networks on a data set",
+        description=_TRAIN_HELP,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.set_defaults(run=_train)
+    tasks = parser.add_argument_group("tasks, one of both")
+    tasks.add_argument("dataset", metavar="DATASET", nargs="?", help="folder that holds train.csv")
+    tasks.add_argument("--worlds", action="store_true", help="draw tasks as they are used")
+    _add_world_options(parser.add_argument_group("with --worlds"))
+    parser.add_argument("--output", required=True, metavar="DIR", help="folder for the run's files")
+    parser.add_argument(
+        "--resume", action="store_true", help="go on from last.pt in the output folder"
+    )
+    parser.add_argument(
+        "--start-from",
+        metavar="FILE",
+        help="begin with the weights of another run's checkpoint, which this one refines",
+    )
+    recipe = parser.add_argument_group("recipe, the later overrides the earlier")
+    recipe.add_argument(
+        "--preset",
+        choices=sorted(PRESETS),
+        default="best",
+        help="worlds: what the bundled model was trained with, for images of 256 pixels; best: "
+        "the best one for the paper's data; paper: the values of the paper (default: best)",
+    )
+    recipe.add_argument(
+        "--network",
+        choices=NETWORKS,
+        default="cbagan",
+        help="cbagan, its ablations with spatial attention (sa), channel attention (ca) or none, "
+        "or sagan with self-attention (default: cbagan)",
+    )
+    recipe.add_argument("--config", metavar="FILE", help="JSON or YAML file with options")
+    recipe.add_argument(
+        "--set",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="KEY=VALUE",
+        help=f"single options; known are {', '.join(TrainingConfig().to_dict())}",
+    )
+    recipe.add_argument("--epochs", type=int, metavar="N", help="the same as --set epochs=N")
+    machine = parser.add_argument_group("machine")
+    machine.add_argument(
+        "--device", default="auto", help="cpu, cuda, ... (default: a GPU if there is one)"
+    )
+    machine.add_argument("--threads", type=int, metavar="N", help="CPU threads (default: all)")
+    parser.add_argument(
+        "--tensorboard", action="store_true", help="write logs for TensorBoard into the folder"
+    )
+    parser.add_argument("--json", metavar="FILE", help="write the scores as JSON")
+
+
+def _add_world_options(group: Any) -> None:
+    settings, schedule = WorldSettings(), WorldSchedule()
+    for name, default, what in (
+        ("--size", settings.size, "side of the maps in pixels"),
+        ("--maps", schedule.maps, f"maps for each epoch, {TASKS_PER_MAP} tasks on each"),
+        ("--held-back", schedule.held_back, "maps for validation, and as many for the test"),
+        ("--jobs", schedule.jobs, "processes that draw"),
+        ("--world-seed", settings.seed, "seed of the tasks"),
+    ):
+        group.add_argument(
+            name, type=int, default=default, metavar="N", help=f"{what} (default: {default})"
+        )
+    group.add_argument(
+        "--hard-share",
+        type=float,
+        default=settings.hard_share,
+        metavar="F",
+        help=f"share of tasks whose way is {HARD_DETOUR} times as long as the straight line, or "
+        f"more (default: {settings.hard_share})",
+    )
+    group.add_argument(
+        "--families",
+        type=lambda text: tuple(text.split(",")),
+        default=settings.families,
+        metavar="A,B",
+        help=f"kinds of maps (default: all: {','.join(settings.families)})",
+    )
+
+
+def add_export_parser(subparsers: Any) -> None:
+    """Add the command ``export``; its ``run`` default takes the parsed arguments."""
+    parser = subparsers.add_parser(
+        "export",
+        help="turn a training checkpoint into a model file",
+        description=_EXPORT_HELP,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.set_defaults(run=_export)
+    parser.add_argument("checkpoint", metavar="CHECKPOINT", help="best.pt of a training run")
+    parser.add_argument("--output", required=True, metavar="FILE", help="the model file, .pt")
+    parser.add_argument(
+        "--note", default="", metavar="TEXT", help="for the card: origin and licence of the data"
+    )
+    parser.add_argument("--json", metavar="FILE", help="write the model's record as JSON")
+
+
+def recipe_of(args: argparse.Namespace) -> TrainingConfig:
+    """The recipe that the arguments of ``train`` ask for.
+
+    Raises:
+        ConfigError: an unknown option, or a value that makes no sense.
+    """
+    config = TrainingConfig.preset(args.preset).with_network(args.network)
+    if args.config is not None:
+        config = TrainingConfig.from_file(args.config, config)
+    values: dict[str, Any] = {}
+    for assignment in args.set:
+        name, equals, text = assignment.partition("=")
+        if not equals:
+            raise ConfigError(f"--set takes KEY=VALUE, got {assignment!r}")
+        try:
+            values[name] = yaml.safe_load(text)
+        except yaml.YAMLError as error:
+            raise ConfigError(f"--set {assignment}: cannot read the value ({error})") from error
+    if args.epochs is not None:
+        values["epochs"] = args.epochs
+    return config.updated(values)
+
+
+def _train(args: argparse.Namespace) -> int:
+    config = recipe_of(args)
+    if args.threads is not None:
+        check_at_least("--threads", args.threads, 1)
+    if args.worlds == (args.dataset is not None):
+        raise ConfigError("tasks come from a DATASET or from --worlds: give one of both")
+    require_torch()
+    import torch
+
+    from ..training.distributed import leads
+    from ..training.loop import train
+
+    if args.threads is not None:
+        torch.set_num_threads(args.threads)
+    try:
+        with _source(args, config) as source:
+            if leads():
+                values = source.description()
+                print(
+                    f"{values['train_tasks']} training tasks an epoch, "
+                    f"{values['test_tasks']} for testing"
+                )
+            result = train(
+                source,
+                config,
+                args.output,
+                resume=args.resume,
+                start_from=args.start_from,
+                device=args.device,
+                tensorboard=args.tensorboard,
+            )
+    except KeyboardInterrupt:
+        print("interrupted; go on with the same command and --resume", file=sys.stderr)
+        return 130
+    if not leads():
+        return 0
+    _print_scores(result)
+    if args.json is not None:
+        write_json(args.json, result)
+    return 0
+
+
+def _source(args: argparse.Namespace, config: TrainingConfig) -> AbstractContextManager[TaskSource]:
+    """The tasks that the arguments of ``train`` ask for."""
+    if args.worlds:
+        # Before the first worlds are drawn, which takes a while.
+        from ..training.batches import check_trainable
+
+        check_trainable(args.size, config)
+        settings = WorldSettings(args.size, args.families, args.hard_share, args.world_seed)
+        return world_source(settings, WorldSchedule(args.maps, args.held_back, args.jobs))
+    dataset = load_dataset(args.dataset)
+    return nullcontext(DatasetSource(dataset, config.validation_fraction, config.seed))
+
+
+def _print_scores(result: dict[str, Any]) -> None:
+    rows = {"best epoch": result["test"], **result["trivial"]}
+    print(f"\nscores of the region on the test tasks (best epoch: {result['epoch']})")
+    for name, scores in rows.items():
+        print(
+            f"  {name:15} IoU {scores['iou']:.3f}  Dice {scores['dice']:.3f}  "
+            f"connectivity {scores['connectivity']:.1%}"
+        )
+    print(f"export it with: cbagan-ompl export {result['checkpoint']} --output MODEL.pt")
+
+
+def _export(args: argparse.Namespace) -> int:
+    require_torch()
+    from ..training.export import export
+
+    record = export(args.checkpoint, args.output, note=args.note)
+    print(
+        f"{args.output}: {record['parameters']:,} parameters, epoch {record['epoch']}, "
+        f"validation IoU {record['metrics']['validation']['iou']:.3f}"
+    )
+    if record["metrics"]["test"] is None:
+        print("the training run has not come to its end: the card has validation scores only")
+    if args.json is not None:
+        write_json(args.json, record)
+    return 0

@@ -1,0 +1,108 @@
+"""Work in several processes, which an interrupt neither hits nor leaves behind."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing import Pipe, active_children, forkserver, get_context, resource_tracker
+from multiprocessing.connection import Connection
+from multiprocessing.context import ForkServerContext
+from threading import current_thread, main_thread
+from typing import Any, TypeVar
+
+from tqdm import tqdm
+
+from ..errors import DatasetError
+
+T = TypeVar("T")
+
+
+@contextmanager
+def interrupts_held() -> Iterator[Connection]:
+    """An interrupt in the block comes at its end; the yielded connection is then ready to read.
+
+    A wait for the connection may miss an interrupt that another thread takes, until the next one.
+
+    A mask of signals would not do: it holds for one thread, and an interrupt that any other one
+    takes, such as that of a progress bar, is raised in the main thread all the same.
+    """
+    came, sender = Pipe(duplex=False)
+    with came, sender:
+        if current_thread() is not main_thread():
+            yield came  # only the main thread gets interrupts
+            return
+        before = signal.signal(signal.SIGINT, lambda *_: sender.send_bytes(b"."))
+        try:
+            yield came
+        finally:
+            signal.signal(signal.SIGINT, before)
+            if came.poll():
+                signal.raise_signal(signal.SIGINT)
+
+
+def fork_server(preload: Sequence[str] = ()) -> ForkServerContext:
+    """What makes processes that are forked from a clean server.
+
+    OMPL, OpenCV and torch have threads, which a fork does not survive. Neither the server nor its
+    processes hear the interrupt of a terminal, which is for all processes that it started: they
+    end with the one that made them. To be called and used with :func:`interrupts_held`.
+
+    Args:
+        preload: modules that the server imports, where it is not there yet.
+    """
+    context = get_context("forkserver")
+    context.set_forkserver_preload(list(preload))
+    resource_tracker.ensure_running()  # lets interrupts in again, so it must be there before
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        forkserver.ensure_running()  # whose processes inherit the mask
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    return context
+
+
+def run_all(
+    work: Callable[..., T],
+    arguments: Sequence[tuple[Any, ...]],
+    processes: int,
+    unit: str,
+    progress: bool = True,
+) -> list[T]:
+    """Results of ``work(*args)`` for each of the arguments, in their order.
+
+    Args:
+        work: a function of a module.
+        arguments: of each call.
+        processes: at a time.
+        unit: what the progress bar counts.
+        progress: show the progress bar.
+
+    Raises:
+        KeyboardInterrupt: after an interrupt; calls that have begun are given up.
+        DatasetError: a process has died.
+        Exception: what a call raised.
+    """
+    results: dict[int, T] = {}
+    others = set(active_children())
+    with interrupts_held():
+        context = fork_server()
+    with ProcessPoolExecutor(processes, context) as pool:
+        try:
+            with interrupts_held():  # submitting starts the processes
+                places = {pool.submit(work, *args): i for i, args in enumerate(arguments)}
+            done = as_completed(places)
+            for future in tqdm(done, total=len(places), unit=f" {unit}", disable=not progress):
+                results[places[future]] = future.result()
+        except BrokenProcessPool as error:
+            raise DatasetError(
+                f"a process that worked on the {unit} has died, perhaps for lack of memory"
+            ) from error
+        except BaseException:
+            for child in set(active_children()) - others:
+                child.terminate()
+            pool.shutdown(cancel_futures=True)
+            raise
+    return [results[i] for i in range(len(arguments))]

@@ -1,0 +1,118 @@
+"""How noisy labels are: the same tasks, labelled twice."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..common.parallel import run_all
+from ..common.validation import check_at_least
+from ..datasets.dataset import Tasks
+from ..datasets.generation import ITERATIONS
+from ..errors import ConfigError
+from ..maps.grid_map import GridMap
+from .metrics import confusion
+
+
+def chosen_tasks(tasks: Tasks, count: int, seed: int) -> Tasks:
+    """Some tasks, drawn at random, in their order.
+
+    Args:
+        tasks: to draw from.
+        count: how many.
+        seed: the same seed gives the same tasks.
+
+    Raises:
+        ConfigError: there are not so many tasks, or the seed is negative.
+    """
+    if not 1 <= count <= len(tasks):
+        raise ConfigError(f"tasks must be from 1 to {len(tasks)}, got {count}")
+    check_at_least("seed", seed, 0)
+    chosen = np.random.default_rng(seed).choice(len(tasks), count, replace=False)
+    return tasks.select(np.sort(chosen))
+
+
+def label_noise(
+    tasks: Tasks, runs: int, range: float, seed: int, jobs: int, progress: bool = True
+) -> dict[str, Any]:
+    """Label tasks twice with different seeds and compare the labels, for the region class alone.
+
+    Two labels of one task differ because RRT is random. A network cannot know which of them it
+    will be scored with. It may still do better than the one label does as a prediction of the
+    other, because it can leave out what only few runs touch: so the comparison with the mean of
+    many runs is made as well (``majority``: the pixels that at least half of some further labels
+    hold, as a prediction of the first one). That is the ceiling, as far as it can be estimated.
+
+    Args:
+        tasks: what to label.
+        runs: of RRT for each label.
+        range: longest edge of RRT in pixels.
+        seed: the same seed gives the same labels.
+        jobs: processes at a time.
+        progress: show a progress bar.
+
+    Returns:
+        IoU and Dice, pooled over all pixels and as means over images: of the second label as a
+        prediction of the first (``two labels``), of the ``majority``, and of each against the
+        labels of the data set (``own labels and the first``, ``own labels and the majority``).
+
+    Raises:
+        ConfigError: an option that makes no sense.
+        TaskError: a task whose start or goal is blocked, or which has no path.
+    """
+    if runs < 1 or not 0 < range < float("inf"):
+        raise ConfigError(f"runs and range must be positive, got {runs} and {range}")
+    check_at_least("seed", seed, 0)
+    free = tasks.free
+    arguments = [
+        (free[i], tasks.start[i], tasks.goal[i], runs, range, (seed, i))
+        for i in np.arange(len(tasks)).tolist()
+    ]
+    labels = np.array(run_all(_labels, arguments, jobs, "tasks", progress))
+    first, second, others = labels[:, 0], labels[:, 1], labels[:, 1:]
+    majority = 2 * others.sum(axis=1) > others.shape[1]
+    own = tasks.region.astype(bool)
+    return {
+        "tasks": len(tasks),
+        "runs": runs,
+        "range": range,
+        "seed": seed,
+        "two labels": _agreement(second, first),
+        "majority": _agreement(majority, first),
+        "own labels and the first": _agreement(first, own),
+        "own labels and the majority": _agreement(majority, own),
+    }
+
+
+#: Labels of each task: the one that is predicted, and an odd number that vote.
+_LABELS = 6
+
+
+def _labels(
+    free: NDArray[np.bool_],
+    start: NDArray[np.float32],
+    goal: NDArray[np.float32],
+    runs: int,
+    range: float,
+    seed: tuple[int, int],
+) -> NDArray[np.bool_]:
+    """Labels of one task, (L, S, S)."""
+    from ..datasets.rrt_labels import rrt_region
+
+    grid = GridMap(free)
+    task = grid.check_task(start, goal)
+    seeds = np.random.default_rng(seed).integers(2**32, size=_LABELS).tolist()
+    return np.array([rrt_region(grid, task, runs, range, ITERATIONS, s) for s in seeds])
+
+
+def _agreement(predicted: NDArray[np.bool_], truth: NDArray[np.bool_]) -> dict[str, float]:
+    counts = confusion(predicted, truth)
+    pooled = counts.pooled()
+    return {
+        "iou": float(pooled.iou()),
+        "dice": float(pooled.dice()),
+        "iou_per_image": float(counts.iou().mean()),
+        "dice_per_image": float(counts.dice().mean()),
+    }

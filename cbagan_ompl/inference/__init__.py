@@ -1,0 +1,1 @@
+"""Exported models applied to maps. No training code, no ompl."""

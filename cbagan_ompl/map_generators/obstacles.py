@@ -1,0 +1,123 @@
+"""Families of maps whose ground is open: obstacles strewn over it, and barriers across it."""
+
+from __future__ import annotations
+
+from math import cos, pi, sin
+
+import numpy as np
+
+from .shapes import Mask, Point, box, canvas, ellipse, scatter, strewn, triangle, without_pockets
+
+
+def walls_with_gaps(rng: np.random.Generator, width: int, height: int) -> Mask:
+    """Walls from border to border with one or two gaps each, and boxes between them."""
+    free, unit = canvas(width, height)
+    count = max(2, round(width / (14 * unit)))
+    lane = width / (count + 1)
+    for i in range(count):
+        thick = round(rng.uniform(1.2, 2.6) * unit)
+        left = round((i + 1) * lane + rng.uniform(-0.08, 0.08) * lane - thick / 2)
+        free[:, left : left + thick] = False
+        for _ in range(rng.integers(1, 3)):
+            gap = round(rng.uniform(3.0, 5.0) * unit)
+            top = rng.integers(round(unit), height - gap - round(unit))
+            free[top : top + gap, left : left + thick] = True
+    for i in range(count + 1):
+        for _ in range(rng.integers(2, 5)):
+            # Too narrow to reach a wall and close its gap.
+            centre = (i + rng.uniform(0.4, 0.6)) * lane, rng.uniform(0.05, 0.95) * height
+            half = rng.uniform(0.06, 0.2) * lane, rng.uniform(0.06, 0.3) * lane
+            free &= ~box(free, centre, half)
+    return without_pockets(free)
+
+
+def clutter(rng: np.random.Generator, width: int, height: int) -> Mask:
+    """Boxes and ellipses of many sizes, turned at random, on a quarter to a third of the map."""
+    free, unit = canvas(width, height)
+    scatter(free, rng, unit, rng.uniform(0.25, 0.34))
+    return without_pockets(free)
+
+
+def narrow_passage(rng: np.random.Generator, width: int, height: int) -> Mask:
+    """A thick wall with one straight passage of 4 to 6 pixels, clutter on both sides of it."""
+    free, unit = canvas(width, height)
+    gap, thick = int(rng.integers(4, 7)), round(rng.uniform(0.12, 0.2) * width)
+    left = round(rng.uniform(0.42, 0.58) * width - thick / 2)
+    top = int(rng.integers(height // 5, 4 * height // 5))
+    # The mouths of the passage stay clear.
+    clear = box(free, (left + thick / 2, top + gap / 2), (thick / 2 + 4 * unit, 2 * unit))
+    scatter(free, rng, unit, rng.uniform(0.14, 0.2), clear)
+    free[:, left : left + thick] = False
+    free[top : top + gap, left : left + thick] = True
+    return without_pockets(free)
+
+
+def bug_trap(rng: np.random.Generator, width: int, height: int) -> Mask:
+    """The classic trap: a hollow body with one mouth on the left, whose lips reach far inside.
+
+    From inside the way to the right, along which a sampled tree grows at first, is shut.
+    """
+    free, unit = canvas(width, height)
+    x, y = (rng.uniform(0.48, 0.52) * side for side in (width, height))
+    a, b = rng.uniform(0.26, 0.29) * width, rng.uniform(0.26, 0.3) * height
+    thick, mouth = round(1.6 * unit), round(rng.uniform(2.2, 3.0) * unit)
+    lip = rng.uniform(0.75, 0.9) * a
+    hollow = ellipse(free, (x, y), (a - thick, b - thick), power=3.0)
+    free &= hollow | ~ellipse(free, (x, y), (a, b), power=3.0)
+    # The channel of the mouth: a block across the wall on the left, with the way in cut out of it.
+    channel = x - a + lip / 2
+    free &= ~box(free, (channel, y), (lip / 2, mouth / 2 + thick))
+    free |= box(free, (channel - unit, y), (lip / 2 + 1.5 * unit, mouth / 2))
+    # A way around the body and in front of its mouth stays clear.
+    clear = ellipse(free, (x, y), (a + 2.5 * unit, b + 2.5 * unit), power=3.0)
+    clear |= box(free, (x - a, y), (5 * unit, 3 * unit))
+    scatter(free, rng, 0.8 * unit, (~free).mean() + rng.uniform(0.07, 0.11), clear)
+    return without_pockets(free)
+
+
+def blocks(rng: np.random.Generator, width: int, height: int) -> Mask:
+    """Upright boxes, apart or overlapping."""
+    free, unit = canvas(width, height)
+
+    def draw(centre: Point) -> Mask:
+        return box(free, centre, (rng.uniform(2, 9) * unit, rng.uniform(2, 9) * unit))
+
+    return strewn(free, rng, rng.uniform(0.1, 0.3), draw)
+
+
+def ellipses(rng: np.random.Generator, width: int, height: int) -> Mask:
+    """Ellipses at any angle."""
+    free, unit = canvas(width, height)
+
+    def draw(centre: Point) -> Mask:
+        half = rng.uniform(2, 9) * unit, rng.uniform(2, 9) * unit
+        return ellipse(free, centre, half, rng.uniform(0, pi))
+
+    return strewn(free, rng, rng.uniform(0.1, 0.3), draw)
+
+
+def triangles(rng: np.random.Generator, width: int, height: int) -> Mask:
+    """Triangles at any angle."""
+    free, unit = canvas(width, height)
+
+    def draw(centre: Point) -> Mask:
+        return triangle(free, centre, rng.uniform(5, 14) * unit, rng.uniform(0, 2 * pi))
+
+    return strewn(free, rng, rng.uniform(0.08, 0.22), draw)
+
+
+def tl_shapes(rng: np.random.Generator, width: int, height: int) -> Mask:
+    """Shapes of the letters T and L, upright or turned by right angles or a little more."""
+    free, unit = canvas(width, height)
+
+    def draw(centre: Point) -> Mask:
+        angle = rng.integers(4) * pi / 2 + rng.normal(0, 0.1)
+        bar, stem, thick = (rng.uniform(*span) * unit for span in ((4, 9), (4, 10), (1.2, 2.5)))
+        # The stem hangs from the middle of the bar, or from one end of it.
+        along = (bar - thick) * int(rng.integers(-1, 2))
+        x = centre[0] + cos(angle) * along - sin(angle) * stem
+        y = centre[1] + sin(angle) * along + cos(angle) * stem
+        upper = box(free, centre, (bar, thick), angle)
+        return upper | box(free, (x, y), (thick, stem), angle)
+
+    return strewn(free, rng, rng.uniform(0.1, 0.24), draw)

@@ -1,0 +1,1 @@
+"""Maps: files, coordinates, exact checks, searches and connectivity on the grid."""

@@ -1,0 +1,142 @@
+"""Shortest paths over the free pixels of a grid, for the controls and for joining heat maps."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from .collision import segment_is_free
+
+# Row and column offset of half of the eight neighbours; the graph is undirected.
+_STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))
+_NO_PREDECESSOR = -9999
+
+# Coarse pixels to each side of the coarse path that make the band to search in.
+_BAND = 3
+
+
+def shortest_path(
+    free: NDArray[np.bool_],
+    start: tuple[int, int],
+    goal: tuple[int, int],
+    cost: NDArray[np.float32] | None = None,
+    coarse_side: int = 256,
+) -> NDArray[np.intp] | None:
+    """Cheapest 8-connected path between two pixels.
+
+    A diagonal step needs both pixels beside it free, so that the path is a valid motion. Large
+    grids are searched around the path through a coarse grid first, so that their path may be a
+    little dearer than the cheapest.
+
+    Args:
+        free: shape (H, W).
+        start: (column, row) of a free pixel.
+        goal: (column, row) of a free pixel.
+        cost: price of a pixel length in each pixel, shape (H, W), positive; 1 by default. A step
+            costs its length times the mean price of its two pixels.
+        coarse_side: longest side of the coarse grid; grids up to twice as long need none.
+
+    Returns:
+        Pixels (column, row), shape (K, 2), both ends included; None where nothing joins them.
+    """
+    price = np.ones(free.shape, np.float32) if cost is None else cost
+    if max(free.shape) > 2 * coarse_side:
+        band = _coarse_band(free, start, goal, price, coarse_side)
+        path = None if band is None else _search(free & band, start, goal, price)
+        if path is not None:
+            return path
+    return _search(free, start, goal, price)
+
+
+def _coarse_band(
+    free: NDArray[np.bool_],
+    start: tuple[int, int],
+    goal: tuple[int, int],
+    price: NDArray[np.float32],
+    coarse_side: int,
+) -> NDArray[np.bool_] | None:
+    """Pixels near the cheapest path through blocks of pixels, free where any of their pixels is."""
+    size = -(-max(free.shape) // coarse_side)
+    padding = [(0, -side % size) for side in free.shape]
+    blocks = np.pad(free, padding)
+    shape = blocks.shape[0] // size, size, blocks.shape[1] // size, size
+    coarse = np.asarray(blocks.reshape(shape).any(axis=(1, 3)))
+    coarse_price = np.pad(price, padding, mode="edge").reshape(shape).mean(axis=(1, 3))
+    source, target = ((u // size, v // size) for u, v in (start, goal))
+    path = _search(coarse, source, target, coarse_price)
+    if path is None:
+        return None
+    visited = np.zeros(coarse.shape, np.uint8)
+    visited[path[:, 1], path[:, 0]] = 1
+    band = cv2.dilate(visited, np.ones((2 * _BAND + 1, 2 * _BAND + 1), np.uint8))
+    fine = band.repeat(size, axis=0).repeat(size, axis=1)[: free.shape[0], : free.shape[1]]
+    return fine.astype(bool)
+
+
+def _search(
+    free: NDArray[np.bool_],
+    start: tuple[int, int],
+    goal: tuple[int, int],
+    price: NDArray[np.float32],
+) -> NDArray[np.intp] | None:
+    """Dijkstra's search over the free pixels."""
+    node = np.full(free.shape, -1, np.int32)
+    pixels = np.flatnonzero(free)
+    node.ravel()[pixels] = np.arange(len(pixels))
+    source, target = (int(node[v, u]) for u, v in (start, goal))
+    graph = _grid_graph(free, price, node, len(pixels))
+    _, predecessors = dijkstra(graph, directed=False, indices=source, return_predecessors=True)
+    nodes = [target]
+    while nodes[-1] != source:
+        before = int(predecessors[nodes[-1]])
+        if before == _NO_PREDECESSOR:
+            return None
+        nodes.append(before)
+    rows, columns = np.divmod(pixels[nodes[::-1]], free.shape[1])
+    return np.stack((columns, rows), axis=-1)
+
+
+def _grid_graph(
+    free: NDArray[np.bool_], price: NDArray[np.float32], node: NDArray[np.int32], count: int
+) -> csr_array:
+    height, width = free.shape
+    tails, heads, weights = [], [], []
+    for down, right in _STEPS:
+        here = (slice(0, height - down), slice(max(0, -right), width - max(0, right)))
+        there = (slice(down, height), slice(max(0, right), width + min(0, right)))
+        passable = free[here] & free[there]
+        if down and right:
+            passable &= free[here[0], there[1]] & free[there[0], here[1]]
+        tails.append(node[here][passable])
+        heads.append(node[there][passable])
+        weights.append(np.hypot(down, right) * 0.5 * (price[here] + price[there])[passable])
+    return csr_array(
+        (np.concatenate(weights), (np.concatenate(tails), np.concatenate(heads))),
+        shape=(count, count),
+    )
+
+
+def pull_taut(free: NDArray[np.bool_], pixels: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Shorten a pixel path to straight segments that stay in free pixels.
+
+    Args:
+        free: shape (H, W).
+        pixels: a path as returned by :func:`shortest_path`, shape (K, 2).
+
+    Returns:
+        Corner points of the shortened path at pixel centres, (u, v), shape (M, 2), M <= K.
+    """
+    height, width = free.shape
+    cells = free.tobytes()
+    points = (pixels + 0.5).tolist()
+    corners = [points[0]]
+    for here, ahead in pairwise(points[1:]):
+        if not segment_is_free(cells, width, height, *corners[-1], *ahead):
+            corners.append(here)
+    corners.append(points[-1])
+    return np.array(corners, dtype=np.float64)

@@ -1,0 +1,115 @@
+"""Map files of every kind, told by their suffix, and the maps that come with the package."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, fields
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..common.files import read_bytes
+from ..errors import ConfigError, MapError
+from .grid_map import GridMap
+from .image_files import SUFFIXES, decode_picture
+from .movingai import load_movingai_map
+from .ros import load_ros_map
+
+if TYPE_CHECKING:
+    from importlib.resources.abc import Traversable
+
+#: What a path to a map that comes with the package begins with.
+BUNDLED = "bundled:"
+
+
+@dataclass(frozen=True)
+class MapOptions:
+    """How map files are read.
+
+    Attributes:
+        threshold: plain pictures only: a pixel is free when its gray level divided by white (255
+            for 8 bits) is at least this, 0 to 1. With 0.5 the level 127 is blocked and 128 free.
+            ROS maps bring their own thresholds, MovingAI maps need none.
+        unknown_is_free: whether pixels of unknown state are free. Unknown are the transparent
+            pixels of a picture (any alpha below full), and in a ROS map also those that are
+            neither free nor occupied, see :mod:`cbagan_ompl.maps.ros`.
+
+    Raises:
+        ConfigError: a value of the wrong type or out of range.
+    """
+
+    threshold: float = 0.5
+    unknown_is_free: bool = False
+
+    def __post_init__(self) -> None:
+        number = isinstance(self.threshold, (int, float)) and not isinstance(self.threshold, bool)
+        if not number or not 0 <= self.threshold <= 1:
+            raise ConfigError(f"threshold must be a number from 0 to 1, got {self.threshold!r}")
+        if not isinstance(self.unknown_is_free, bool):
+            raise ConfigError(f"unknown_is_free is True or False, got {self.unknown_is_free!r}")
+
+
+def load_map(path: str | os.PathLike[str], **options: Any) -> GridMap:
+    """Read a map file; see :meth:`cbagan_ompl.GridMap.load`, which this stands behind.
+
+    Args:
+        path: the file, or ``bundled:NAME``. The map is called after the file, without suffix.
+        **options: the fields of :class:`MapOptions`.
+
+    Raises:
+        MapError: the file is missing, unreadable, truncated, empty or of an unknown kind.
+        ConfigError: an unknown option, or one with a value that makes no sense.
+    """
+    known = [field.name for field in fields(MapOptions)]
+    for option in options:
+        if option not in known:
+            raise ConfigError(f"unknown map option {option!r}; known are {', '.join(known)}")
+    settings = MapOptions(**options)
+    if str(path).startswith(BUNDLED):
+        return _load_bundled(str(path).removeprefix(BUNDLED), settings)
+
+    file = Path(path)
+    suffix = file.suffix.lower()
+    if suffix in SUFFIXES:
+        return _picture_map(read_bytes(file), str(file), file.stem, settings)
+    if suffix in (".yaml", ".yml"):
+        return load_ros_map(file, unknown_is_free=settings.unknown_is_free)
+    if suffix == ".map":
+        return load_movingai_map(file)
+    raise MapError(
+        f"{file}: unknown kind of map file; known are {', '.join(SUFFIXES)} (pictures), .yaml and "
+        f".yml (ROS map_server), .map (MovingAI) and {BUNDLED}NAME"
+    )
+
+
+def bundled_maps() -> tuple[str, ...]:
+    """The names of the maps that come with the package, for ``GridMap.load("bundled:NAME")``."""
+    names = (Path(entry.name) for entry in bundled_folder().iterdir())
+    return tuple(sorted(name.stem for name in names if name.suffix == ".png"))
+
+
+def bundled_folder() -> Traversable:
+    """Where the maps that come with the package and their ``tasks.csv`` are."""
+    return resources.files("cbagan_ompl") / "maps" / "bundled"
+
+
+def _load_bundled(name: str, settings: MapOptions) -> GridMap:
+    if name not in bundled_maps():
+        raise MapError(f"no map {name!r} is bundled; there are {', '.join(bundled_maps())}")
+    data = (bundled_folder() / f"{name}.png").read_bytes()
+    return _picture_map(data, BUNDLED + name, name, settings)
+
+
+def _picture_map(data: bytes, place: str, name: str, settings: MapOptions) -> GridMap:
+    gray, white, opaque = decode_picture(data, place)
+    free = (np.arange(white + 1) / white >= settings.threshold)[gray]
+    if opaque is not None:
+        free = free | ~opaque if settings.unknown_is_free else free & opaque
+    if not free.any():
+        raise MapError(
+            f"{place}: no pixel is opaque and as bright as the threshold {settings.threshold:g}; "
+            "choose a lower threshold, or unknown_is_free where free space is transparent"
+        )
+    return GridMap(free, name=name)

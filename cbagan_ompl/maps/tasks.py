@@ -1,0 +1,155 @@
+"""Planning tasks: start and goal pairs from files, and those that come with a map."""
+
+from __future__ import annotations
+
+import csv
+import os
+from dataclasses import dataclass
+from importlib import resources
+from math import isfinite
+from pathlib import Path, PureWindowsPath
+
+from ..common.files import read_text
+from ..errors import MapError
+from .grid_map import GridMap
+from .loading import BUNDLED, bundled_folder
+from .movingai import read_scenarios
+
+_COLUMNS = ("map", "start_x", "start_y", "goal_x", "goal_y")
+
+
+@dataclass(frozen=True)
+class Task:
+    """Where to plan from and to.
+
+    Attributes:
+        start: (x, y) in the map's world coordinates.
+        goal: (x, y) in the map's world coordinates.
+        optimal_cost: length of the shortest path in world units, where it is known.
+        family: what kind of map it is on, where that is known.
+    """
+
+    start: tuple[float, float]
+    goal: tuple[float, float]
+    optimal_cost: float | None = None
+    family: str | None = None
+
+
+def load_tasks(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
+    """Read the tasks for a map from a MovingAI ``.scen`` or a ``.csv`` file.
+
+    A ``.scen`` file belongs to one map, whose name is not compared. Its cells become the centres
+    of pixels, scaled when the file was made for another size of the map. ``optimal_cost`` stays
+    empty: the length in the file is that of the best path along the eight directions of the grid,
+    and a path in any direction may be shorter.
+
+    A ``.csv`` file has the columns ``map, start_x, start_y, goal_x, goal_y`` in any order,
+    optionally ``optimal_cost`` and ``family``, and any others, which are not read. ``map`` is the
+    file or the name of a map; rows of other maps than ``grid`` are left out. Coordinates are world
+    ones.
+
+    Whether the tasks can be planned for is not checked here, :meth:`GridMap.check_task` does that.
+
+    Args:
+        path: the file, its kind is told by its suffix.
+        grid: the map to plan on.
+
+    Raises:
+        MapError: the file cannot be read, is malformed (the message names the line), or has no
+            task for this map.
+    """
+    file = Path(path)
+    suffix = file.suffix.lower()
+    if suffix == ".scen":
+        return _scen_tasks(file, grid)
+    if suffix == ".csv":
+        return _csv_tasks(file, grid)
+    raise MapError(f"{file}: unknown kind of task file; known are .scen and .csv")
+
+
+def tasks_of(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
+    """The tasks that come with a map.
+
+    These are those of the package for ``bundled:NAME``, and those in ``NAME.map.scen`` or
+    ``NAME.scen`` beside a MovingAI map ``NAME.map``.
+
+    Args:
+        path: what the map was loaded from.
+        grid: the map.
+
+    Returns:
+        The tasks, none for other maps.
+
+    Raises:
+        MapError: the task file is malformed.
+    """
+    if str(path).startswith(BUNDLED):
+        with resources.as_file(bundled_folder() / "tasks.csv") as file:
+            return load_tasks(file, grid)
+    file = Path(path)
+    if file.suffix.lower() == ".map":
+        for beside in (Path(f"{file}.scen"), file.with_suffix(".scen")):
+            if beside.is_file():
+                return load_tasks(beside, grid)
+    return []
+
+
+def _scen_tasks(path: Path, grid: GridMap) -> list[Task]:
+    tasks = []
+    for scenario in read_scenarios(path):
+        # In whole numbers: the pixel that the centre of the scaled cell lies in.
+        pixels = [
+            (
+                (2 * x + 1) * grid.width // (2 * scenario.width) + 0.5,
+                (2 * y + 1) * grid.height // (2 * scenario.height) + 0.5,
+            )
+            for x, y in (scenario.start, scenario.goal)
+        ]
+        (start_x, start_y), (goal_x, goal_y) = grid.to_world(pixels).tolist()
+        tasks.append(Task((start_x, start_y), (goal_x, goal_y)))
+    return tasks
+
+
+def _csv_tasks(path: Path, grid: GridMap) -> list[Task]:
+    tasks, others = [], set()
+    reader = csv.DictReader(read_text(path).splitlines(), skipinitialspace=True)
+    try:
+        missing = [name for name in _COLUMNS if name not in (reader.fieldnames or ())]
+        if missing:
+            raise MapError(f"{path}, line 1: missing columns: {', '.join(missing)}")
+        for row in reader:
+            place = f"{path}, line {reader.line_num}"
+            if None in row or None in row.values():
+                raise MapError(f"{place}: expected {len(reader.fieldnames or ())} fields")
+            # The folders of either system are left out.
+            if grid.name in (row["map"], PureWindowsPath(row["map"]).stem):
+                tasks.append(_csv_task(place, row))
+            else:
+                others.add(row["map"])
+    except csv.Error as error:
+        # The line that cannot be split is not counted yet.
+        raise MapError(f"{path}, line {reader.line_num + 1}: {error}") from error
+    if not tasks:
+        raise MapError(
+            f"{path}: no task for the map {grid.name!r}, only for "
+            f"{', '.join(sorted(others)) or 'none'}"
+        )
+    return tasks
+
+
+def _csv_task(place: str, row: dict[str, str]) -> Task:
+    start_x, start_y, goal_x, goal_y = (_number(place, row, name) for name in _COLUMNS[1:])
+    cost = _number(place, row, "optimal_cost") if row.get("optimal_cost", "").strip() else None
+    if cost is not None and cost < 0:
+        raise MapError(f"{place}: optimal_cost is a length and cannot be {cost:g}")
+    return Task((start_x, start_y), (goal_x, goal_y), cost, row.get("family") or None)
+
+
+def _number(place: str, row: dict[str, str], column: str) -> float:
+    try:
+        number = float(row[column])
+    except ValueError:
+        number = float("nan")
+    if not isfinite(number):
+        raise MapError(f"{place}: {column} must be a finite number, got {row[column]!r}")
+    return number

@@ -1,0 +1,1 @@
+"""Heat maps and the samples drawn from them. Knows nothing of OMPL or torch."""

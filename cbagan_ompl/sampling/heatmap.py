@@ -1,0 +1,296 @@
+"""The heat map: where on a map a good path probably runs, as a distribution over free pixels."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import HeatmapError
+from ..maps.grid_map import GridMap
+from ..maps.grid_search import pull_taut, shortest_path
+
+#: A pixel whose value is at least this belongs to the promising region.
+REGION_BORDER = 0.5
+
+# Half widths of painted paths, as a share of the map's longer side: the corridor is where a
+# planner should look, the bridge only joins parts of a region and is kept narrow.
+_CORRIDOR_SHARE = 0.03
+_BRIDGE_SHARE = 0.015
+_MIN_HALF_WIDTH = 2.0
+
+# Longest side of the coarse grid in which bridges are looked for.
+_REPAIR_SIDE = 64
+
+# Price of a pixel length inside the region, relative to one where the heat map is 0.
+_REGION_PRICE = 0.02
+
+
+class Heatmap:
+    """Values over the pixels of a :class:`GridMap`, read as an unnormalised density.
+
+    Attributes:
+        values: float32, shape (H, W), in [0, 1]; 0 on obstacles. From
+            :data:`REGION_BORDER` on, a pixel counts as part of the promising region.
+        grid: the map that the values lie on.
+
+    Args:
+        values: any real array of the grid's shape. Unsigned integers are scaled from their full
+            range to [0, 1], but for masks of 0 and 1; other values must lie in it already.
+        grid: the map.
+
+    Raises:
+        HeatmapError: wrong shape or type, NaN, infinite or negative values, values above 1, or
+            nothing above 0 on free space.
+    """
+
+    def __init__(self, values: ArrayLike, grid: GridMap) -> None:
+        raw = np.asarray(values)
+        if raw.shape != grid.shape:
+            raise HeatmapError(
+                f"a heat map of {grid.name} has shape {grid.shape} (rows, columns), "
+                f"this one has {raw.shape}"
+            )
+        scaled = _to_unit_range(raw)
+        scaled *= grid.free
+        support = np.flatnonzero(scaled > 0)
+        if not len(support):
+            raise HeatmapError(
+                f"the heat map is 0 on all free space of {grid.name}: there is nothing to draw; "
+                "use Heatmap.uniform where nothing is known"
+            )
+        scaled.setflags(write=False)
+        self.values: NDArray[np.float32] = scaled
+        self.grid = grid
+        self._support = support
+
+    @classmethod
+    def load(cls, path: str | PathLike[str], grid: GridMap) -> Heatmap:
+        """Read a heat map of a grid: a grey image (black 0, white 1) or a NumPy ``.npy`` array.
+
+        Raises:
+            HeatmapError: the file cannot be read, or holds no heat map of this grid.
+        """
+        source = Path(path)
+        try:
+            if source.suffix.lower() == ".npy":
+                return cls(np.load(source, allow_pickle=False), grid)
+            encoded = np.frombuffer(source.read_bytes(), np.uint8)
+        except (OSError, ValueError, EOFError) as error:
+            raise HeatmapError(f"cannot read the heat map {source}: {error}") from error
+        image = cv2.imdecode(encoded, cv2.IMREAD_GRAYSCALE) if encoded.size else None
+        if image is None:
+            raise HeatmapError(f"{source} is neither an image nor a .npy array")
+        return cls(image, grid)
+
+    @classmethod
+    def uniform(cls, grid: GridMap) -> Heatmap:
+        """The control that knows nothing: 1 on all free space."""
+        return cls(grid.free, grid)
+
+    @classmethod
+    def straight_line(cls, grid: GridMap, start: ArrayLike, goal: ArrayLike) -> Heatmap:
+        """The cheap control: a band around the segment from start to goal, obstacles ignored.
+
+        Args:
+            grid: the map.
+            start: (x, y), world.
+            goal: (x, y), world.
+
+        Raises:
+            TaskError: see :meth:`GridMap.check_task`.
+        """
+        ends = grid.check_task(start, goal)
+        return cls(_band(grid.shape, grid.to_pixel(ends), _half_width(grid, _CORRIDOR_SHARE)), grid)
+
+    @classmethod
+    def corridor(cls, grid: GridMap, start: ArrayLike, goal: ArrayLike) -> Heatmap:
+        """The oracle control: a band around the shortest path that a grid search finds.
+
+        The search is 8-connected without cutting corners, its path pulled taut. It shows what a
+        perfect heat map is worth; it is no planner of ours, since it solves the task itself.
+
+        Args:
+            grid: the map.
+            start: (x, y), world.
+            goal: (x, y), world.
+
+        Raises:
+            TaskError: see :meth:`GridMap.check_task`.
+        """
+        ends = grid.to_pixel(grid.check_task(start, goal))
+        pixels = shortest_path(grid.free, *pixel_pair(ends))
+        assert pixels is not None, "check_task has made sure that a path exists"
+        path = np.vstack((ends[:1], pull_taut(grid.free, pixels), ends[1:]))
+        return cls(_band(grid.shape, path, _half_width(grid, _CORRIDOR_SHARE)), grid)
+
+    @property
+    def region(self) -> NDArray[np.bool_]:
+        """The promising region: values from :data:`REGION_BORDER` on, shape (H, W)."""
+        return self.values >= REGION_BORDER
+
+    @cached_property
+    def parts(self) -> NDArray[np.int32]:
+        """The 4-connected parts of the region, numbered from 1; 0 outside of it, shape (H, W)."""
+        parts = cv2.connectedComponents(self.region.view(np.uint8), connectivity=4)[1]
+        return np.asarray(parts, np.int32)
+
+    def joins(self, start: ArrayLike, goal: ArrayLike) -> bool:
+        """Whether the region holds both ends and a 4-connected way between them.
+
+        Args:
+            start: (x, y), world.
+            goal: (x, y), world.
+        """
+        ends = np.array((start, goal), dtype=np.float64)
+        if not self.grid.is_free(ends).all():
+            return False
+        first, second = pixel_pair(self.grid.to_pixel(ends))
+        label = int(self.parts[first[1], first[0]])
+        return label > 0 and label == int(self.parts[second[1], second[0]])
+
+    def joined(self, start: ArrayLike, goal: ArrayLike) -> Heatmap:
+        """This heat map with a region that joins start and goal.
+
+        Where the region falls apart, its parts are joined by the cheapest path through the heat
+        map: next to free of charge inside the region, the dearer outside the lower the value.
+
+        Args:
+            start: (x, y), world.
+            goal: (x, y), world.
+
+        Returns:
+            The heat map itself when its region joins them already.
+
+        Raises:
+            TaskError: see :meth:`GridMap.check_task`.
+        """
+        ends = self.grid.to_pixel(self.grid.check_task(start, goal))
+        if self.joins(start, goal):
+            return self
+        price = np.where(self.region, np.float32(_REGION_PRICE), 1 + _REGION_PRICE - self.values)
+        pixels = shortest_path(self.grid.free, *pixel_pair(ends), price, _REPAIR_SIDE)
+        assert pixels is not None, "check_task has made sure that a path exists"
+        bridge = _band(
+            self.grid.shape, pixels + np.float64(0.5), _half_width(self.grid, _BRIDGE_SHARE)
+        )
+        return Heatmap(np.maximum(self.values, bridge), self.grid)
+
+    def sample(self, n: int, rng: np.random.Generator | int | None = None) -> NDArray[np.float64]:
+        """Draw points with a density proportional to the values.
+
+        Pixels are drawn exactly, by the inverse of the cumulative sum; inside its pixel a point
+        is uniform.
+
+        Args:
+            n: how many points.
+            rng: a generator, or the seed of a new one.
+
+        Returns:
+            World points, shape (n, 2).
+        """
+        generator = np.random.default_rng(rng)
+        cumulative = self.values.ravel()[self._support].cumsum(dtype=np.float64)
+        pixels = draw_pixels(self._support, cumulative, n, generator)
+        return points_in(self.grid, pixels, generator)
+
+    @property
+    def support(self) -> NDArray[np.intp]:
+        """Flat row-major indices of the pixels with a value above 0, ascending, shape (K,)."""
+        return self._support
+
+    def __repr__(self) -> str:
+        share = self.region.sum() / self.grid.free.sum()
+        return f"Heatmap({self.grid.name!r}, region {share:.0%} of free space)"
+
+
+def draw_pixels(
+    support: NDArray[np.intp],
+    cumulative: NDArray[np.float64] | None,
+    n: int,
+    rng: np.random.Generator,
+) -> NDArray[np.intp]:
+    """Draw some of the pixels of a heat map.
+
+    Args:
+        support: flat row-major pixel indices, shape (K,).
+        cumulative: cumulative sum of their weights, shape (K,), the last one above 0; None where
+            all weigh the same.
+        n: how many.
+        rng: the generator.
+
+    Returns:
+        Flat row-major pixel indices, shape (n,).
+    """
+    if cumulative is None:
+        chosen = rng.integers(len(support), size=n)
+    else:
+        chosen = np.searchsorted(cumulative, rng.random(n) * cumulative[-1], side="right")
+    pixels: NDArray[np.intp] = support[np.minimum(chosen, len(support) - 1)]
+    return pixels
+
+
+def points_in(
+    grid: GridMap, pixels: NDArray[np.intp], rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """A uniform point in each of some pixels.
+
+    Args:
+        grid: the map.
+        pixels: flat row-major indices, shape (n,).
+        rng: the generator.
+
+    Returns:
+        World points, shape (n, 2).
+    """
+    corners = np.stack((pixels % grid.width, pixels // grid.width), axis=-1)
+    return grid.to_world(corners + rng.random((len(pixels), 2)))
+
+
+def _to_unit_range(raw: NDArray[Any]) -> NDArray[np.float32]:
+    """A fresh array of the values in [0, 1]."""
+    if raw.dtype.kind in "bu":
+        is_mask = raw.dtype.kind == "b" or raw.max() <= 1
+        full = 1 if is_mask else np.iinfo(raw.dtype).max
+        return raw.astype(np.float32) / np.float32(full)
+    if raw.dtype.kind not in "if":
+        raise HeatmapError(f"a heat map holds real numbers, not {raw.dtype}")
+    values = raw.astype(np.float32)
+    if not np.isfinite(values).all():
+        raise HeatmapError(
+            f"the heat map holds {int((~np.isfinite(values)).sum())} NaN or infinite values"
+        )
+    low, high = float(values.min()), float(values.max())
+    if low < 0 or high > 1:
+        raise HeatmapError(
+            f"heat map values lie in [0, 1], these span {low:g} to {high:g}; "
+            "shift and scale them first"
+        )
+    return values
+
+
+def pixel_pair(ends: NDArray[np.float64]) -> tuple[tuple[int, int], tuple[int, int]]:
+    """The pixels (column, row) of two points (u, v), shape (2, 2)."""
+    (u0, v0), (u1, v1) = np.floor(ends).astype(int).tolist()
+    return (u0, v0), (u1, v1)
+
+
+def _half_width(grid: GridMap, share: float) -> float:
+    return max(_MIN_HALF_WIDTH, share * max(grid.shape))
+
+
+def _band(
+    shape: tuple[int, int], path: NDArray[np.float64], half_width: float
+) -> NDArray[np.float32]:
+    """Paint a polyline of pixel points (M, 2): 1 on it, 0.5 at ``half_width`` pixels from it."""
+    off_path = np.ones(shape, np.uint8)
+    corners = np.floor(path).astype(np.int32).reshape(-1, 1, 2)
+    cv2.polylines(off_path, [corners], isClosed=False, color=0)
+    distance = cv2.distanceTransform(off_path, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    band: NDArray[np.float32] = np.exp2(-((distance / np.float32(half_width)) ** 2))
+    return np.where(band < 0.01, np.float32(0), band)

@@ -1,0 +1,1 @@
+"""Training runs: tasks, losses, steps, checkpoints, validation and export."""

@@ -1,0 +1,208 @@
+"""From a training checkpoint to one file that runs without this package's network code."""
+
+from __future__ import annotations
+
+import datetime
+import json
+import warnings
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import nn
+
+from ..errors import ModelError
+from ..inference.model_files import MANIFEST, RECORD_NAME, RECORD_SCHEMA, read_manifest, sha256
+from ..networks.export_model import RegionModel
+from .checkpoints import best_generator, load_checkpoint
+
+INPUTS = (
+    "free: float (B, 1, H, W) in [0, 1], 1 where free, any H and W; "
+    "start, goal: float (B, 2), pixel coordinates (u, v), u right and v down from the upper left "
+    "corner, the centre of the upper left pixel is (0.5, 0.5)"
+)
+OUTPUTS = "float (B, 1, H, W) in [0, 1]: probability that a pixel belongs to the promising region"
+
+
+def export(
+    checkpoint: str | PathLike[str], path: str | PathLike[str], *, note: str = ""
+) -> dict[str, Any]:
+    """Write the generator of a checkpoint as a TorchScript file with its record.
+
+    Beside the file go a model card (the same name with suffix ``.md``) and its line in
+    ``manifest.json``, which names the default model and the SHA-256 of each.
+
+    Args:
+        checkpoint: a file that :func:`cbagan_ompl.training.loop.train` wrote.
+        path: the file to write; its suffix is ``.pt``.
+        note: what the checkpoint cannot know, for the record and the card: where the data come
+            from, under which licence data and model are.
+
+    Returns:
+        The record, as the file carries it.
+
+    Raises:
+        ModelError: the checkpoint cannot be read, the file cannot be written, or has another
+            suffix.
+    """
+    target = Path(path)
+    if target.suffix != ".pt":
+        raise ModelError(f"{target}: the name of an exported model ends in .pt")
+    state = load_checkpoint(checkpoint)
+    generator = best_generator(state)
+    record = make_record(target.stem, state, generator, note)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.touch()
+    except OSError as error:
+        raise ModelError(f"cannot write {target}: {error.strerror or error}") from error
+    model = RegionModel(generator).eval()
+    # Convolutions in this layout take four fifths of the time on a CPU.
+    model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    save_script(model, target, record)
+    target.with_suffix(".md").write_text(model_card(record), encoding="utf-8")
+    _update_manifest(target)
+    return record
+
+
+def save_script(model: nn.Module, path: Path, record: dict[str, Any]) -> None:
+    """Compile, freeze and save a module in evaluation mode, with its record inside."""
+    with warnings.catch_warnings():
+        # TorchScript is deprecated in favour of torch.export, but it is the form that this
+        # package's models have, and torch goes on reading and writing it.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        # No optimize_for_inference: what it writes cannot be loaded again.
+        frozen = torch.jit.freeze(torch.jit.script(model))
+        extra = {RECORD_NAME: json.dumps(record, indent=1)}
+        torch.jit.save(frozen, str(path), _extra_files=extra)
+
+
+def make_record(
+    name: str, state: dict[str, Any], generator: nn.Module, note: str = ""
+) -> dict[str, Any]:
+    """What a model file says about itself.
+
+    Args:
+        name: of the model.
+        state: the training checkpoint.
+        generator: to count its parameters.
+        note: see :func:`export`.
+    """
+    last = state["history"][-1]
+    return {
+        "schema": RECORD_SCHEMA,
+        "name": name,
+        "inputs": INPUTS,
+        "outputs": OUTPUTS,
+        "working_size": state["dataset"]["side"],
+        "parameters": sum(parameter.numel() for parameter in generator.parameters()),
+        "recipe": state["config"],
+        "epoch": last["epoch"],
+        "dataset": state["dataset"],
+        "note": note,
+        # The test scores are there once the run has come to its end.
+        "metrics": {
+            "validation": last["validation"],
+            "test": state.get("test"),
+            "trivial": state.get("trivial"),
+        },
+        "torch": str(torch.__version__),
+        "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
+    }
+
+
+def model_card(record: dict[str, Any]) -> str:
+    """The record as Markdown, for people."""
+    dataset, metrics = record["dataset"], record["metrics"]
+    split = "test" if metrics["test"] else "validation"
+    rows = {
+        "this model": metrics[split],
+        **((metrics["trivial"] if split == "test" else None) or {}),
+    }
+    columns = ("iou", "dice", "precision", "recall", "connectivity")
+    table = "\n".join(
+        f"| {name} | " + " | ".join(f"{scores[column]:.3f}" for column in columns) + " |"
+        for name, scores in rows.items()
+    )
+    recipe = "\n".join(f"- `{name}`: {value}" for name, value in record["recipe"].items())
+    return f"""# {record["name"]}
+
+Predicts, for a 2-D occupancy map with a start and a goal, the region that good paths probably run
+through: the generator of {_network(record["recipe"])}, trained against a map and a
+point discriminator, exported as TorchScript on {record["date"]} with torch {record["torch"]}.
+
+- Input: {record["inputs"]}
+- Output: {record["outputs"]}
+- Parameters: {record["parameters"]:,}
+- Maps are scaled to {record["working_size"]} pixels on the longer side, the size of the training
+  images; small ones to twice their size.
+
+## Data
+
+{_data(dataset)}
+
+{record["note"] or "Licence and origin of the data: not stated."}
+
+## Scores
+
+Of the region class alone, over all pixels of the {split} tasks; connectivity is the share of tasks
+whose start and goal one 8-connected part of the region in free space joins.
+
+| predictor | {" | ".join(columns)} |
+|---|{"---|" * len(columns)}
+{table}
+
+## Limits
+
+The scores hold for maps like those of the training set. On other maps the region is a guess that
+may miss the way, so samplers keep a share of uniform draws, and a planner's guarantees rest on
+that share. The region says nothing of a robot's shape or dynamics.
+
+## Recipe
+
+Epoch {record["epoch"]} of:
+
+{recipe}
+"""
+
+
+def _data(dataset: dict[str, Any]) -> str:
+    """What a model was trained on."""
+    side = dataset["side"]
+    if "worlds" not in dataset:
+        return (
+            f"`{dataset['name']}`: {dataset['maps']} maps of {side} x {side} pixels,\n"
+            f"{dataset['train_tasks']} tasks for training and validation, "
+            f"{dataset['test_tasks']} for testing."
+        )
+    worlds = dataset["worlds"]
+    return (
+        f"Drawn while it was trained (`cbagan-ompl train --worlds`, seed {worlds['seed']}): "
+        f"{dataset['maps']} new maps of {side} x {side}\n"
+        f"pixels in each epoch with {dataset['train_tasks']} tasks, "
+        f"{worlds['hard_share']:.0%} of them hard; {dataset['test_tasks']} tasks on other maps\n"
+        "for testing. The label of a pixel falls with the detour that a path through it takes, to "
+        "0.5 at\n"
+        f"{worlds['label']['epsilon']:.0%} and {worlds['label']['slack']:g} pixel. Families: "
+        f"{', '.join(worlds['families'])}."
+    )
+
+
+def _network(recipe: dict[str, Any]) -> str:
+    """What the network of a recipe is called."""
+    kinds = [name for name in ("channel", "spatial", "self") if recipe.get(f"{name}_attention")]
+    if kinds == ["self"]:
+        return "a GAN with self-attention (SAGAN)"
+    if kinds == ["channel", "spatial"]:
+        return "a convolutional block attention GAN (CBAGAN-RRT)"
+    return f"a GAN with {' and '.join(kinds) or 'no'} attention"
+
+
+def _update_manifest(model: Path) -> None:
+    path = model.parent / MANIFEST
+    manifest: dict[str, Any] = {"default": model.name, "files": {}}
+    if path.exists():
+        manifest = read_manifest(path)
+    manifest["files"][model.name] = {"sha256": sha256(model)}
+    path.write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")

@@ -1,0 +1,316 @@
+"""The training loop: discriminator step, generator step, validation, checkpoint."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from ..datasets.dataset import Tasks
+from ..errors import ConfigError
+from .batches import Batch, check_trainable, make_batch, scaled_down
+from .checkpoints import BEST, LAST, SCHEMA, best_generator, load_checkpoint, save_atomically
+from .config import TrainingConfig
+from .distributed import ProcessGroup, process_group
+from .gan import Networks, encode, pick_device
+from .schedule import learning_rate_factor, plateau_factor
+from .steps import adversarial_shares, discriminator_step, generator_step
+from .task_sources import TaskSource
+from .tensorboard import scalar_log, write_scalars
+from .validation import evaluate, trivial_scores
+
+LOG = "log.jsonl"
+
+
+@dataclass
+class Run:
+    """Everything that changes while a run goes on, and that a resumed run needs.
+
+    Attributes:
+        networks: weights and optimiser states.
+        rng: draws the order of the tasks and their augmentation.
+        noise_rng: draws the noise; on the CPU, so that a run does not depend on the device.
+        history: what the log says, one entry an epoch.
+    """
+
+    networks: Networks
+    rng: np.random.Generator
+    noise_rng: torch.Generator
+    history: list[dict[str, Any]] = field(default_factory=list)
+
+    def state_dict(self) -> dict[str, Any]:
+        """The run as a checkpoint holds it."""
+        return {
+            "networks": self.networks.state_dict(),
+            "rng": json.dumps(self.rng.bit_generator.state),
+            "noise_rng": self.noise_rng.get_state(),
+            "history": self.history,
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """The inverse of :meth:`state_dict`."""
+        self.networks.load_state_dict(state["networks"])
+        self.rng.bit_generator.state = json.loads(state["rng"])
+        self.noise_rng.set_state(state["noise_rng"])
+        self.history = state["history"]
+
+
+def train(
+    source: TaskSource,
+    config: TrainingConfig,
+    output: str | PathLike[str],
+    *,
+    resume: bool = False,
+    start_from: str | PathLike[str] | None = None,
+    device: str = "auto",
+    progress: bool = True,
+    tensorboard: bool = False,
+) -> dict[str, Any]:
+    """Train the three networks.
+
+    After each epoch the folder holds ``last.pt`` (everything needed to go on), ``best.pt`` (the
+    epoch with the highest region IoU on the validation tasks, the one to export) and ``log.jsonl``
+    (one line an epoch). An interrupted run loses at most the epoch under way, and a resumed run
+    gives the same weights as one that was never interrupted.
+
+    Under ``torchrun`` the processes share each batch, and the first one writes the files.
+
+    Args:
+        source: of the tasks, see :mod:`cbagan_ompl.training.task_sources`.
+        config: the recipe.
+        output: the folder for the files, made if missing.
+        resume: go on from ``last.pt`` in that folder; without it the folder must hold none.
+        start_from: checkpoint of another run of the same networks, whose weights this one begins
+            with.
+        device: ``auto`` (a GPU if there is one), ``cpu``, ``cuda``, ...
+        progress: show a progress bar.
+        tensorboard: write losses and scores for TensorBoard into the folder as well.
+
+    Returns:
+        ``validation`` and ``test`` scores of the best epoch, ``trivial`` scores of predictors that
+        know nothing, on the test tasks, the ``epoch`` number and the path of the ``checkpoint``.
+
+    Raises:
+        ConfigError: ``resume`` with another recipe or other tasks, or without it although the
+            folder holds a run; ``start_from`` with other networks; the folder cannot be made; no
+            such device; the loss is not finite; or the processes cannot share a batch evenly.
+        DatasetError: the images are of a size that the networks cannot take.
+        MissingDependencyError: ``tensorboard`` without the package of that name.
+        ModelError: a checkpoint that cannot be read.
+    """
+    folder = Path(output)
+    place = pick_device(device)
+    check_trainable(source.side, config)
+    with process_group(place) as group:
+        if config.batch_size % group.size:
+            raise ConfigError(
+                f"batches of {config.batch_size} cannot be shared evenly by {group.size} processes"
+            )
+        if group.leads:
+            _prepare_folder(folder, resume)
+        run = _new_run(config, place, group, start_from)
+        if resume:
+            state = _matching_checkpoint(folder / LAST, config, source) if group.leads else None
+            run.load_state_dict(group.from_leader(state))
+        progress = progress and group.leads
+        if progress:
+            for name, scores in trivial_scores(source.validation).items():
+                print(f"for comparison, {name}: {_summary(scores)}")
+        log = scalar_log(folder, len(run.history)) if tensorboard and group.leads else None
+        for epoch in range(len(run.history), config.epochs):
+            entry = _epoch(run, config, source, place, epoch, progress)
+            run.history.append(entry)
+            if group.leads:
+                _save(run, config, source, folder)
+                if log is not None:
+                    write_scalars(log, entry)
+            if progress:
+                scores, seconds = entry["validation"], entry["seconds"]
+                print(f"epoch {epoch + 1}/{config.epochs}: {_summary(scores)}, {seconds:.0f} s")
+        return group.from_leader(_finish(folder, source, place, config) if group.leads else None)
+
+
+def _new_run(
+    config: TrainingConfig,
+    device: torch.device,
+    group: ProcessGroup,
+    start_from: str | PathLike[str] | None,
+) -> Run:
+    run = Run(
+        Networks(config, device, group),
+        np.random.default_rng(config.seed),
+        torch.Generator().manual_seed(config.seed),
+    )
+    if start_from is not None:
+        run.networks.start_from(load_checkpoint(start_from)["networks"])
+    return run
+
+
+def _prepare_folder(folder: Path, resume: bool) -> None:
+    if not resume and (folder / LAST).exists():
+        raise ConfigError(
+            f"{folder} holds a run already; resume it (--resume), or choose another folder"
+        )
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(f"cannot make the folder {folder}: {error.strerror or error}") from error
+
+
+def _epoch(
+    run: Run,
+    config: TrainingConfig,
+    source: TaskSource,
+    device: torch.device,
+    epoch: int,
+    progress: bool,
+) -> dict[str, Any]:
+    """One pass over the tasks, and its entry in the log."""
+    began = time.perf_counter()
+    means = _train_epoch(run, config, source.epoch(epoch), device, epoch, progress)
+    networks = run.networks
+    model = networks.average if config.ema_decay else networks.generator
+    scores = networks.group.from_leader(
+        evaluate(model, source.validation, device, config.batch_size)
+        if networks.group.leads
+        else None
+    )
+    seconds = round(time.perf_counter() - began, 1)
+    return {"epoch": epoch + 1, "seconds": seconds, "losses": means, "validation": scores}
+
+
+def _train_epoch(
+    run: Run,
+    config: TrainingConfig,
+    tasks: Tasks,
+    device: torch.device,
+    epoch: int,
+    progress: bool,
+) -> dict[str, float]:
+    """Means of the losses over the steps in which they were computed."""
+    order = run.rng.permutation(len(tasks))
+    size = _batch_size(len(order), config, run.networks.group)
+    # The tasks that fill no batch wait for the next epoch, which has another order.
+    steps = len(order) // size
+    plateau = plateau_factor(config, [entry["validation"]["iou"] for entry in run.history])
+    totals: dict[str, list[float]] = {}
+    run.networks.generator.train()
+    bar = tqdm(range(steps), desc=f"epoch {epoch + 1}", leave=False, disable=not progress)
+    for i in bar:
+        step = epoch * steps + i
+        run.networks.set_learning_rates(plateau * learning_rate_factor(config, step, steps))
+        indices = order[i * size : (i + 1) * size]
+        values = _step(run, config, tasks, indices, device, step)
+        if not all(math.isfinite(value) for value in values.values()):
+            raise ConfigError(
+                f"the loss is not finite in epoch {epoch + 1}; lower the learning rates"
+            )
+        run.networks.update_average(config.ema_decay, step)
+        for name, value in values.items():
+            totals.setdefault(name, []).append(value)
+        bar.set_postfix(segmentation=f"{values['segmentation']:.3f}")
+    return {name: float(np.mean(entries)) for name, entries in totals.items()}
+
+
+def _batch_size(tasks: int, config: TrainingConfig, group: ProcessGroup) -> int:
+    """Tasks in a batch: where there are too few, what all processes can have the same number of."""
+    size = min(tasks, config.batch_size)
+    size -= size % group.size
+    if size == 0:
+        raise ConfigError(f"{group.size} processes cannot share {tasks} training tasks")
+    return size
+
+
+def _step(
+    run: Run,
+    config: TrainingConfig,
+    tasks: Tasks,
+    indices: NDArray[np.int64],
+    device: torch.device,
+    step: int,
+) -> dict[str, float]:
+    """Teach the networks with one batch, or this process's share of it."""
+    networks = run.networks
+    batch = make_batch(
+        tasks,
+        indices,
+        device,
+        run.rng,
+        symmetries=config.symmetries,
+        reversal=config.reversal,
+    )
+    if len(config.scales) > 1:
+        batch = scaled_down(batch, int(run.rng.choice(config.scales)))
+    noise = torch.randn(batch.free.shape, generator=run.noise_rng).to(device)
+    share = networks.group.share
+    batch, noise = Batch(*map(share, vars(batch).values())), share(noise)
+    images = encode(batch)
+    fake = networks.run("generator", images.map, images.points, noise)
+    if step % config.adversarial_every:
+        return generator_step(networks, config, batch, images, fake, None)
+    errors = discriminator_step(networks, images, fake)
+    shares = adversarial_shares(config, errors)
+    return errors | generator_step(networks, config, batch, images, fake, shares)
+
+
+def _save(run: Run, config: TrainingConfig, source: TaskSource, folder: Path) -> None:
+    state = {
+        "schema": SCHEMA,
+        "config": config.to_dict(),
+        "dataset": source.description(),
+        **run.state_dict(),
+    }
+    ious = [entry["validation"]["iou"] for entry in run.history]
+    if ious[-1] == max(ious):
+        save_atomically(state, folder / BEST)
+    save_atomically(state, folder / LAST)
+    lines = "".join(json.dumps(entry) + "\n" for entry in run.history)
+    (folder / LOG).write_text(lines, encoding="utf-8")
+
+
+def _matching_checkpoint(path: Path, config: TrainingConfig, source: TaskSource) -> dict[str, Any]:
+    state = load_checkpoint(path)
+    saved, wanted = state["config"], config.to_dict()
+    changed = [name for name in wanted if saved.get(name) != wanted[name]]
+    if changed:
+        raise ConfigError(
+            f"{path} was written with other values of {', '.join(changed)}; "
+            "resume with the recipe that the run began with"
+        )
+    if state["dataset"] != source.description():
+        raise ConfigError(f"{path} belongs to another data set: {state['dataset']}")
+    return state
+
+
+def _finish(
+    folder: Path, source: TaskSource, device: torch.device, config: TrainingConfig
+) -> dict[str, Any]:
+    """Score the best epoch on the test tasks and add the scores to its checkpoint."""
+    best = load_checkpoint(folder / BEST)
+    generator = best_generator(best).to(device)
+    best["test"] = evaluate(generator, source.test, device, config.batch_size)
+    best["trivial"] = trivial_scores(source.test)
+    save_atomically(best, folder / BEST)
+    return {
+        "checkpoint": str(folder / BEST),
+        "epoch": best["history"][-1]["epoch"],
+        "validation": best["history"][-1]["validation"],
+        "test": best["test"],
+        "trivial": best["trivial"],
+    }
+
+
+def _summary(scores: dict[str, float]) -> str:
+    return (
+        f"region IoU {scores['iou']:.3f}, Dice {scores['dice']:.3f}, "
+        f"connectivity {scores['connectivity']:.1%}"
+    )

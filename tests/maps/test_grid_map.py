@@ -1,0 +1,351 @@
+"""GridMap: frames, exact checks of segments, inflation, tasks, refusals."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from itertools import pairwise
+from math import floor, pi
+
+import numpy as np
+import pytest
+
+from cbagan_ompl.errors import MapError, TaskError
+from cbagan_ompl.maps.collision import segment_is_free
+from cbagan_ompl.maps.grid_map import MAX_SIDE, GridMap
+
+
+def random_free(rng, height, width, blocked=0.3):
+    free = rng.random((height, width)) > blocked
+    free[0, 0] = True
+    return free
+
+
+# --- frames -----------------------------------------------------------------------------------
+
+
+def test_image_frame_is_pixels_with_y_down():
+    grid = GridMap([[1, 0, 1], [1, 1, 1]])
+    np.testing.assert_array_equal(grid.to_world([2.5, 0.5]), [2.5, 0.5])
+    assert not grid.is_free((1.5, 0.5))
+    assert grid.is_free((1.5, 1.5))
+    low, high = grid.bounds
+    assert (low.tolist(), high.tolist()) == ([0, 0], [3, 2])
+
+
+def test_resolution_scales_the_image_frame():
+    grid = GridMap([[1, 0, 1], [1, 1, 1]], resolution=0.5)
+    np.testing.assert_array_equal(grid.to_pixel([1.25, 0.25]), [2.5, 0.5])
+    assert grid.bounds[1].tolist() == [1.5, 1.0]
+
+
+def test_ros_frame_has_its_origin_at_the_lower_left_corner():
+    grid = GridMap([[1, 0, 1], [1, 1, 1]], resolution=0.5, origin=(10, 20, 0))
+    np.testing.assert_allclose(grid.to_pixel([10, 20]), [0, 2])  # lower left corner of the picture
+    np.testing.assert_allclose(grid.to_world([0, 0]), [10, 21])
+    # The blocked pixel is in the upper row of the picture, so at larger y.
+    assert not grid.is_free((10.75, 20.75))
+    assert grid.is_free((10.75, 20.25))
+
+
+def test_yaw_turns_the_map_counter_clockwise_about_its_origin():
+    grid = GridMap([[1, 0, 1], [1, 1, 1]], resolution=0.5, origin=(10, 20, pi / 2))
+    # What was 0.75 to the right and 0.75 up is now 0.75 to the left and 0.75 up.
+    assert not grid.is_free((9.25, 20.75))
+    np.testing.assert_allclose(grid.to_pixel([9.25, 20.75]), [1.5, 0.5], atol=1e-12)
+    low, high = grid.bounds
+    np.testing.assert_allclose([low, high], [[9, 20], [10, 21.5]], atol=1e-12)
+
+
+@pytest.mark.parametrize("origin", [None, (0, 0, 0), (-12.5, 7.25, 0.7), (3, -4, -2.5)])
+@pytest.mark.parametrize("resolution", [1.0, 0.05, 3.0])
+def test_world_and_pixel_are_inverse(origin, resolution):
+    grid = GridMap(np.ones((31, 47)), resolution, origin)
+    pixels = np.random.default_rng(0).uniform(0, 31, (5, 20, 2))
+    np.testing.assert_allclose(grid.to_pixel(grid.to_world(pixels)), pixels, atol=1e-9)
+    # Lengths are those of the pixels times the resolution, whatever the frame.
+    steps = np.diff(grid.to_world(pixels), axis=1)
+    np.testing.assert_allclose(
+        np.hypot(*np.moveaxis(steps, -1, 0)),
+        resolution * np.hypot(*np.moveaxis(np.diff(pixels, axis=1), -1, 0)),
+    )
+
+
+def test_is_free_looks_up_the_pixel_of_every_point():
+    rng = np.random.default_rng(1)
+    grid = GridMap(random_free(rng, 7, 9), 0.5, (1, 2, 0.3))
+    pixels = rng.uniform(-1, 10, (3, 40, 2))
+    expected = [
+        [0 <= u < 9 and 0 <= v < 7 and grid.free[floor(v), floor(u)] for u, v in line]
+        for line in pixels
+    ]
+    result = grid.is_free(grid.to_world(pixels))
+    assert result.shape == (3, 40)
+    np.testing.assert_array_equal(result, expected)
+
+
+def test_is_free_outside_and_for_nan():
+    grid = GridMap(np.ones((2, 3)))
+    points = [
+        (0, 0),
+        (3, 1),
+        (1, 2),
+        (-1e-9, 1),
+        (np.nan, 1),
+        (1e20, 1),
+        (1e300, 0),
+        (2.999, 1.999),
+    ]
+    assert grid.is_free(points).tolist() == [True, *[False] * 6, True]
+
+
+# --- segments ---------------------------------------------------------------------------------
+
+
+def pixels_on_the_way(u0, v0, u1, v1):
+    """All pixels that a segment passes through, in exact arithmetic; all four at a corner."""
+    u0, v0, u1, v1 = (Fraction(x) for x in (u0, v0, u1, v1))
+
+    def at(t):
+        return u0 + t * (u1 - u0), v0 + t * (v1 - v0)
+
+    def pixel(t):
+        u, v = at(t)
+        return floor(u), floor(v)
+
+    times = {Fraction(0), Fraction(1)}
+    for a, b in ((u0, u1), (v0, v1)):
+        if a != b:
+            for border in range(floor(min(a, b)), floor(max(a, b)) + 2):
+                t = (border - a) / (b - a)
+                if 0 <= t <= 1:
+                    times.add(t)
+    times = sorted(times)
+    found = {pixel(t) for t in times}
+    found |= {pixel((s + t) / 2) for s, t in pairwise(times)}
+    for i, t in enumerate(times):
+        before = pixel((times[i - 1] + t) / 2) if i else pixel(t)
+        after = pixel((times[i + 1] + t) / 2) if i + 1 < len(times) else pixel(t)
+        if before[0] != after[0] and before[1] != after[1]:
+            found |= {(before[0], after[1]), (after[0], before[1])}
+    return found
+
+
+def segments_to_try(rng, width, height):
+    """Random ones, and many through corners, along borders and along the axes and diagonals."""
+    top = np.array([width, height, width, height])
+    yield from rng.uniform(0, 1, (150, 4)) * top
+    quarters = np.floor(rng.uniform(0, 1, (350, 4)) * top * 4) / 4
+    yield from quarters
+    for u, v, other, _ in quarters[:60]:
+        yield u, v, other, v
+        if other < height:
+            yield u, v, u, other
+    for u, v in quarters[:80, :2]:
+        for du, dv in ((1, 1), (1, -1), (2, 1), (-1, 2)):
+            for length in (1.5, 3.0):
+                end = u + du * length, v + dv * length
+                if 0 <= end[0] < width and 0 <= end[1] < height:
+                    yield u, v, *end
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_segments_agree_with_exact_arithmetic(seed):
+    rng = np.random.default_rng(seed)
+    width, height = 13, 9
+    free = random_free(rng, height, width, blocked=0.12)
+    cells = free.tobytes()
+    answers = []
+    for segment in segments_to_try(rng, width, height):
+        u0, v0, u1, v1 = (float(x) for x in segment)
+        way = pixels_on_the_way(u0, v0, u1, v1)
+        expected = all(0 <= c < width and 0 <= r < height and free[r, c] for c, r in way)
+        assert segment_is_free(cells, width, height, u0, v0, u1, v1) == expected, segment
+        assert segment_is_free(cells, width, height, u1, v1, u0, v0) == expected, segment
+        answers.append(expected)
+    assert 0.2 < np.mean(answers) < 0.8  # both answers occur often
+
+
+def test_long_segments_miss_no_corner():
+    # The way from one corner of a large map to near the other, through hundreds of corners, with
+    # one blocked pixel beside a late corner.
+    size = 4000
+    for du, dv in ((1, 1), (3, 2), (7, 5), (1, 3)):
+        steps = (size - 2) // max(du, dv)
+        free = np.ones((size, size), dtype=bool)
+        u0, v0 = 1.0, 1.0
+        u1, v1 = 1.0 + du * (steps - 1), 1.0 + dv * (steps - 1)
+        column, row = 1 + du * (steps - 2), 1 + dv * (steps - 2)
+        free[row - 1, column] = False  # touched at its lower left corner only
+        cells = free.tobytes()
+        assert not segment_is_free(cells, size, size, u0, v0, u1, v1)
+        assert not segment_is_free(cells, size, size, u1, v1, u0, v0)
+
+
+def test_no_way_between_obstacles_that_touch_diagonally():
+    grid = GridMap([[1, 0], [0, 1]])
+    assert not grid.path_is_free([(0.5, 0.5), (1.5, 1.5)])
+    assert grid.components[0, 0] != grid.components[1, 1]
+
+
+def test_path_is_free():
+    grid = GridMap([[1, 1, 1], [1, 0, 1], [1, 1, 1]], resolution=2.0, origin=(5, 5, 0.4))
+    ring = grid.to_world([(0.5, 0.5), (2.5, 0.5), (2.5, 2.5), (0.5, 2.5), (0.5, 0.5)])
+    assert grid.path_is_free(ring)
+    assert not grid.path_is_free(ring[[0, 2]])
+    assert grid.path_is_free(ring[:1])
+    assert not grid.path_is_free(grid.to_world([(1.5, 1.5)]))
+    assert not grid.path_is_free(grid.to_world([(0.5, 0.5), (-0.5, 0.5)]))
+    assert not grid.path_is_free([(np.nan, 0), (np.nan, 1)])
+
+
+# --- inflation --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("resolution", [1.0, 0.05, 0.1])
+def test_inflated_keeps_the_pixels_that_are_radius_away_and_no_others(resolution):
+    rng = np.random.default_rng(5)
+    free = random_free(rng, 24, 31, blocked=0.02)
+    grid = GridMap(free, resolution, (1, 2, 0.5), name="room")
+    rows, columns = np.indices(free.shape)
+    blocked = np.argwhere(~free)
+    # The gap between the squares of two pixels, for every pixel the smallest of them, squared.
+    down = np.maximum(abs(rows[..., None] - blocked[:, 0]) - 1, 0)
+    right = np.maximum(abs(columns[..., None] - blocked[:, 1]) - 1, 0)
+    squared = (down**2 + right**2).min(axis=-1)
+    for squares in (0.01, 1, 2, 3.9, 4, 4.1, 5, 13):
+        radius = np.sqrt(squares) * resolution
+        inflated = grid.inflated(radius)
+        np.testing.assert_array_equal(inflated.free, free & (squared >= squares - 1e-6))
+        assert (inflated.resolution, inflated.origin, inflated.name) == (
+            grid.resolution,
+            grid.origin,
+            f"room (inflated by {radius:g})",
+        )
+
+
+def test_inflated_forgives_the_rounding_of_the_radius():
+    free = np.ones((1, 30), dtype=bool)
+    free[0, 0] = False
+    # 1.1 / 0.1 is a little more than 11, and 0.3 / 0.1 a little less than 3.
+    assert GridMap(free, 0.1).inflated(1.1).free.sum() == 30 - 12
+    assert GridMap(free, 0.1).inflated(0.3).free.sum() == 30 - 4
+
+
+def test_inflated_leaves_what_needs_no_change():
+    grid = GridMap([[1, 0, 1, 1]])
+    assert grid.inflated(0) is grid
+    empty = GridMap(np.ones((4, 4)))
+    assert empty.inflated(100) is empty  # the border of the map is no obstacle
+
+
+@pytest.mark.parametrize("radius", [-1, np.nan, np.inf])
+def test_inflated_refuses_what_is_no_length(radius):
+    with pytest.raises(MapError, match="at least 0"):
+        GridMap([[1, 0]]).inflated(radius)
+
+
+def test_inflated_refuses_when_nothing_stays_free():
+    with pytest.raises(MapError, match="fits nowhere on this map"):
+        GridMap([[1, 0, 1]]).inflated(2)
+
+
+# --- tasks ------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def divided():
+    return GridMap([[1, 1, 0, 1], [1, 1, 0, 1]], name="divided")
+
+
+def test_components(divided):
+    labels = divided.components
+    assert labels.dtype == np.int32
+    assert (labels > 0).tolist() == divided.free.tolist()
+    assert len({labels[0, 0], labels[1, 1], labels[0, 1]}) == 1
+    assert labels[0, 0] != labels[0, 3]
+
+
+def test_check_task_returns_arrays(divided):
+    start, goal = divided.check_task((0.5, 0.5), [1, 1])
+    assert (start.tolist(), goal.tolist()) == ([0.5, 0.5], [1, 1])
+    assert start.dtype == np.float64
+
+
+@pytest.mark.parametrize(
+    ("start", "goal", "message"),
+    [
+        ((0.5, 0.5), (0.5, 0.5), "same point"),
+        ((0.5, 0.5), (2.5, 0.5), r"goal \(2.5, 0.5\) is in an obstacle.*column 2, row 0"),
+        ((9, 0.5), (0.5, 0.5), r"start \(9, 0.5\) is outside divided.*x 0 to 4 and y 0 to 2"),
+        ((1e300, 0.5), (0.5, 0.5), "start .* is outside"),
+        ((0.5, 0.5), (0.5, -0.1), "goal .* is outside"),
+        ((0.5, 0.5), (4, 1), "goal .* is outside"),
+        ((0.5, 0.5), (3.5, 0.5), "no path joins"),
+        ((0.5, np.nan), (0.5, 0.5), "start must be two finite numbers"),
+        ((0.5, 0.5), (1, 2, 3), "goal must be two finite numbers"),
+        ((0.5, 0.5), "A1", "goal must be two finite numbers"),
+        (None, (0.5, 0.5), "start must be two finite numbers"),
+    ],
+)
+def test_check_task_says_what_is_wrong(divided, start, goal, message):
+    with pytest.raises(TaskError, match=message):
+        divided.check_task(start, goal)
+
+
+# --- refusals ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("free", "message"),
+    [
+        (np.ones(4), r"shape \(4,\)"),
+        (np.ones((2, 2, 3)), "2-D array"),
+        (np.ones((0, 5)), "at least one pixel"),
+        ([[1, 1], [1]], "2-D array"),
+        (np.zeros((3, 3)), "every pixel is blocked"),
+        ([["a", "b"]], "booleans or numbers"),
+        ([[1.0, np.nan]], "NaN"),
+        (np.broadcast_to(np.True_, (1, MAX_SIDE + 1)), f"up to {MAX_SIDE} pixels"),
+    ],
+)
+def test_no_map_from(free, message):
+    with pytest.raises(MapError, match=message):
+        GridMap(free)
+
+
+@pytest.mark.parametrize("resolution", [0, -0.05, np.nan, np.inf])
+def test_resolution_must_be_a_length(resolution):
+    with pytest.raises(MapError, match="resolution"):
+        GridMap([[1]], resolution)
+
+
+@pytest.mark.parametrize("origin", [(0, 0), (0, 0, np.nan), (0, 0, 0, 0)])
+def test_origin_must_be_a_pose(origin):
+    with pytest.raises(MapError, match="origin"):
+        GridMap([[1]], 1.0, origin)
+
+
+def test_the_map_is_a_read_only_copy():
+    source = np.ones((2, 2), dtype=bool)
+    grid = GridMap(source)
+    source[0, 0] = False
+    assert grid.free.all()
+    with pytest.raises(ValueError, match="read-only"):
+        grid.free[0, 0] = False
+
+
+def test_shape_and_repr():
+    grid = GridMap([[255, 0, 1]], 0.05, (1, 2, 0), name="hall")
+    assert (grid.width, grid.height, grid.shape) == (3, 1, (1, 3))
+    assert repr(grid) == ("GridMap('hall', 3 x 1 pixels of 0.05, origin (1.0, 2.0, 0.0), 67% free)")
+    assert "image frame" in repr(GridMap([[1]]))
+
+
+def test_clearance_is_the_distance_to_the_nearest_obstacle() -> None:
+    free = np.random.default_rng(0).random((30, 40)) > 0.02
+    clearance = GridMap(free).clearance
+    blocked = np.argwhere(~free)
+    pixels = np.argwhere(free)
+    exact = np.sqrt(((pixels[:, None] - blocked) ** 2).sum(2)).min(1)
+    np.testing.assert_allclose(clearance[free], exact, rtol=0.02)
+    assert (clearance[~free] == 0).all()

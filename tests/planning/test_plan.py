@@ -1,0 +1,272 @@
+from __future__ import annotations
+
+import gc
+import json
+import resource
+from typing import Any
+
+import numpy as np
+import pytest
+from helpers.tasks import GOAL, START
+
+from cbagan_ompl import (
+    CbaganOmplError,
+    ConfigError,
+    GridMap,
+    Heatmap,
+    HeatmapError,
+    MapError,
+    PlannerError,
+    PlanResult,
+    TaskError,
+    bundled_maps,
+    plan,
+    tasks_of,
+)
+from cbagan_ompl.planning import compat
+
+
+def check(result: PlanResult, grid: GridMap) -> None:
+    assert result.solved, result.status
+    assert grid.path_is_free(result.path)
+    np.testing.assert_array_equal(result.path[0], result.start)
+    assert np.hypot(*(result.path[-1] - result.goal)) <= result.goal_tolerance + 1e-9
+    assert np.isclose(result.cost, np.hypot(*np.diff(result.path, axis=0).T).sum())
+    assert result.nodes >= len(result.path)
+    assert result.total_s == result.inference_s + result.planning_s + result.simplify_s
+
+
+@pytest.mark.parametrize("planner", ["RRT", "RRTstar", "InformedRRTstar", "PRM"])
+@pytest.mark.parametrize("sampler", ["uniform", "corridor", "straight-line"])
+def test_samplers_and_planners(two_walls: GridMap, planner: str, sampler: str) -> None:
+    result = plan(two_walls, START, GOAL, planner, sampler, time=0.5, range=None, seed=1)
+    check(result, two_walls)
+    assert result.sampler == sampler
+    assert (result.hook is None) == (sampler == "uniform")
+    assert (result.draws["learned"] > 0) == (sampler != "uniform")
+    assert (result.inference_s > 0) == (sampler != "uniform")
+    assert result.first_solution_s is not None
+    assert 0 < result.first_solution_s <= result.planning_s
+    assert (len(result.progress) > 0) == ("RRTstar" in planner)
+    if len(result.progress):
+        assert result.progress[0, 0] == result.first_solution_s
+        assert (np.diff(result.progress[:, 1]) < 0).all()
+        assert np.isclose(result.progress[-1, 1], result.cost)
+
+
+@pytest.mark.parametrize("name", bundled_maps())
+def test_bundled_tasks_can_be_solved(name: str) -> None:
+    grid = GridMap.load(f"bundled:{name}")
+    for task in tasks_of(f"bundled:{name}", grid):
+        result = plan(grid, task.start, task.goal, "RRT", "corridor", time=10, range=20, seed=0)
+        check(result, grid)
+
+
+def test_corridor_beats_uniform_where_it_is_hard() -> None:
+    """The oracle needs fewer iterations to a first solution: the hook does its work."""
+    grid = GridMap.load("bundled:maze")
+    task = tasks_of("bundled:maze", grid)[0]
+    medians = {
+        sampler: np.median(
+            [
+                plan(grid, task.start, task.goal, "RRT", sampler, 10, range=20, seed=seed).nodes
+                for seed in range(15)
+            ]
+        )
+        for sampler in ("uniform", "corridor")
+    }
+    assert medians["corridor"] < 0.7 * medians["uniform"], medians
+
+
+@pytest.mark.parametrize("sampler", ["uniform", "corridor"])
+@pytest.mark.parametrize("planner", ["RRT", "RRTstar", "InformedRRTstar"])
+def test_same_seed_same_plan(two_walls: GridMap, planner: str, sampler: str) -> None:
+    runs = [
+        plan(two_walls, START, GOAL, planner, sampler, 30, iterations=700, range=20, seed=seed)
+        for seed in (5, 5, 6)
+    ]
+    np.testing.assert_array_equal(runs[0].path, runs[1].path)
+    assert runs[0].nodes == runs[1].nodes
+    assert not np.array_equal(runs[0].path, runs[2].path)
+
+
+def test_seed_is_reported_and_repeats_the_run(two_walls: GridMap) -> None:
+    first = plan(two_walls, START, GOAL, "RRT", "corridor", 10, range=20)
+    again = plan(two_walls, START, GOAL, "RRT", "corridor", 10, range=20, seed=first.seed)
+    np.testing.assert_array_equal(first.path, again.path)
+
+
+def test_world_frame(two_walls: GridMap) -> None:
+    """The same map in metres, y up and turned: same result, up to the frame."""
+    grid = GridMap(two_walls.free, 0.05, (-2.0, 7.0, 0.5))
+    start, goal = grid.to_world([START, GOAL])
+    result = plan(grid, start, goal, "RRTstar", "corridor", 1.0, range=1.0, seed=3)
+    check(result, grid)
+    assert 590 < result.cost / 0.05 < 640
+
+
+def test_radius_keeps_clear_of_obstacles(two_walls: GridMap) -> None:
+    result = plan(two_walls, START, GOAL, "RRTstar", "corridor", 0.7, radius=6, range=20, seed=0)
+    check(result, two_walls.inflated(6))
+    blocked = np.argwhere(~two_walls.free)[:, ::-1]
+    for start, end in zip(result.path[:-1], result.path[1:], strict=True):
+        for point in np.linspace(start, end, 40):
+            gap = np.maximum(np.maximum(blocked - point, point - blocked - 1), 0)
+            assert np.hypot(*gap.T).min() >= 6
+
+
+def test_simplify_shortens(two_walls: GridMap) -> None:
+    plain = plan(two_walls, START, GOAL, "RRT", "corridor", 5, range=20, seed=2)
+    shorter = plan(two_walls, START, GOAL, "RRT", "corridor", 5, range=20, seed=2, simplify=True)
+    check(shorter, two_walls)
+    assert shorter.cost < 0.97 * plain.cost
+    assert shorter.simplify_s > 0
+
+
+@pytest.mark.parametrize("sampler", ["uniform", "corridor"])
+@pytest.mark.parametrize("planner", ["RRT", "RRTstar", "InformedRRTstar"])
+def test_path_to_the_goal_itself(two_walls: GridMap, planner: str, sampler: str) -> None:
+    result = plan(
+        two_walls, START, GOAL, planner, sampler, 5, 1500, range=20, seed=0, goal_tolerance=0
+    )
+    check(result, two_walls)
+    np.testing.assert_array_equal(result.path[-1], GOAL)
+
+
+def test_own_heatmap(two_walls: GridMap, corridor: Heatmap) -> None:
+    result = plan(two_walls, START, GOAL, "RRT", time=5, range=20, heatmap=corridor, seed=0)
+    check(result, two_walls)
+    assert result.sampler == "heatmap"
+    assert result.draws["learned"] > result.draws["uniform"]
+
+
+def test_unsolved_is_said(two_walls: GridMap) -> None:
+    result = plan(two_walls, START, GOAL, "RRTstar", "uniform", 5, iterations=20, range=5, seed=0)
+    assert not result.solved
+    assert result.path.shape == (0, 2)
+    assert result.first_solution_s is None
+    values = json.loads(json.dumps(result.to_dict(), allow_nan=False))
+    assert values["cost"] is None
+    assert values["path"] == []
+    assert values["status"] != "Exact solution"
+
+
+def test_json_fields(two_walls: GridMap) -> None:
+    result = plan(two_walls, START, GOAL, "RRT", "corridor", 5, range=20, seed=0, keep_tree=True)
+    values = json.loads(json.dumps(result.to_dict(), allow_nan=False))
+    assert set(values) >= {
+        "solved", "planner", "sampler", "hook", "ompl_version", "seed", "path", "cost",
+        "inference_s", "planning_s", "total_s", "nodes", "draws", "first_solution_s",
+    }  # fmt: skip
+    assert not {"tree", "heatmap"} & set(values)
+    assert set(values["draws"]) == {"learned", "uniform"}
+    assert values["ompl_version"] == compat.ompl_version()
+    assert result.tree is not None
+    assert result.tree.shape == (result.nodes - 1, 2, 2)
+
+
+BAD = [
+    ({"start": (300, 10)}, TaskError, "start .300, 10. is outside two_walls"),
+    ({"goal": (100, 65)}, TaskError, "goal .100, 65. is in an obstacle"),
+    ({"goal": START}, TaskError, "same point"),
+    ({"start": (1, 2, 3)}, TaskError, "two finite numbers"),
+    ({"start": (np.nan, 2)}, TaskError, "two finite numbers"),
+    ({"start": "here"}, TaskError, "two finite numbers"),
+    ({"planner": "RRTstarr"}, PlannerError, "no planner 'RRTstarr'.*RRTstar"),
+    ({"planner": "SimpleSetup"}, PlannerError, "no planner 'SimpleSetup'"),
+    ({"sampler": "magic"}, ConfigError, "no sampler 'magic'.*corridor"),
+    ({"planner": "AORRTC"}, PlannerError, "no planner 'AORRTC' to use"),
+    ({"time": 0}, ConfigError, "time"),
+    ({"time": np.nan}, ConfigError, "time"),
+    ({"iterations": 0}, ConfigError, "iterations"),
+    ({"range": -1}, ConfigError, "range"),
+    ({"planner": "PRM", "range": 2}, ConfigError, "PRM has no range"),
+    ({"radius": -1}, MapError, "radius"),
+    ({"radius": 500}, MapError, "fits nowhere"),
+    ({"seed": -1}, ConfigError, "seed"),
+    ({"uniform_fraction": 0, "sampler": "corridor"}, ConfigError, "uniform_fraction"),
+    ({"goal_tolerance": -1}, ConfigError, "goal_tolerance"),
+    ({"seed": 1.5}, ConfigError, "seed is a whole number"),
+    ({"time": "1"}, ConfigError, "time"),
+    ({"time": None}, ConfigError, "time"),
+    ({"iterations": 10.5}, ConfigError, "iterations"),
+    ({"radius": None}, MapError, "radius"),
+    ({"uniform_fraction": 0}, ConfigError, "uniform_fraction"),
+    ({"uniform_fraction": "x"}, ConfigError, "uniform_fraction"),
+    ({"sharpness": 0}, ConfigError, "sharpness"),
+    ({"sharpness": "x"}, ConfigError, "sharpness"),
+    ({"sampler": "learned", "heatmap": np.ones((3, 3))}, HeatmapError, "shape"),
+    ({"sampler": "uniform", "model": "file"}, ConfigError, "uses no model"),
+    ({"grid": "missing.png"}, MapError, "missing.png"),
+]
+
+
+@pytest.mark.parametrize(("changes", "kind", "message"), BAD)
+def test_bad_input(
+    two_walls: GridMap, changes: dict[str, Any], kind: type[CbaganOmplError], message: str
+) -> None:
+    arguments: dict[str, Any] = {
+        "grid": two_walls, "start": START, "goal": GOAL, "sampler": "uniform", "time": 0.1
+    }  # fmt: skip
+    with pytest.raises(kind, match=message):
+        plan(**(arguments | changes))
+
+
+def test_separate_parts_are_told_at_once() -> None:
+    free = np.ones((50, 50), bool)
+    free[:, 25] = False
+    with pytest.raises(TaskError, match=r"no path joins start \(10, 10\) and goal \(40, 10\)"):
+        plan(GridMap(free), (10, 10), (40, 10), sampler="uniform", time=60)
+
+
+def test_heatmap_of_another_map(two_walls: GridMap) -> None:
+    other = Heatmap.uniform(GridMap(np.ones((5, 5))))
+    with pytest.raises(HeatmapError, match=r"\(256, 256\).*\(5, 5\)"):
+        plan(two_walls, START, GOAL, heatmap=other)
+
+
+def test_numpy_scalars_are_numbers(two_walls: GridMap) -> None:
+    result = plan(
+        two_walls, START, GOAL, "RRT", "corridor", np.float32(5), np.int64(5000), np.float32(20),
+        seed=np.int64(3), goal_tolerance=np.float32(1),
+    )  # fmt: skip
+    check(result, two_walls)
+    json.dumps(result.to_dict(), allow_nan=False)
+
+
+@pytest.mark.parametrize("planner", sorted(compat.planner_names() - {"BITstar"}))
+def test_every_planner_comes_back(two_walls: GridMap, planner: str) -> None:
+    result = plan(two_walls, START, GOAL, planner, "uniform", 0.3, seed=1)
+    assert result.planning_s < 2
+    if result.solved:
+        check(result, two_walls)
+
+
+def test_prm_and_iterations(two_walls: GridMap) -> None:
+    if "PRM" in compat.HANGS_ON_PYTHON_TERMINATION:
+        with pytest.raises(ConfigError, match=r"PRM .*cannot be limited by iterations"):
+            plan(two_walls, START, GOAL, "PRM", "uniform", iterations=10)
+
+
+@pytest.mark.parametrize("planner", ["RRT", "InformedRRTstar", "PRM"])
+def test_memory_does_not_grow(planner: str) -> None:
+    """1,000 plans in one process: less than 5 % of growth."""
+    free = np.ones((32, 32), bool)
+    free[10, :28] = False
+    grid = GridMap(free)
+
+    def run(times: int) -> int:
+        for seed in range(times):
+            limit = {"time": 0.005} if planner == "PRM" else {"iterations": 40}
+            plan(grid, (3, 3), (3, 28), planner, "corridor", range=None, seed=seed, **limit)
+        gc.collect()
+        return resident()
+
+    before = run(150)
+    assert run(1000) < 1.05 * before
+
+
+def resident() -> int:
+    """Resident memory in pages."""
+    with open("/proc/self/statm") as statm:
+        return int(statm.read().split()[1]) * resource.getpagesize()
