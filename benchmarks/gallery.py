@@ -32,7 +32,7 @@ def main() -> None:
         raw = predictor.predict(grid, task.start, task.goal, repair=False)
         result = plan(grid, task.start, task.goal, model=predictor, time=0.3, range=20, seed=0)
         draw_heatmap(axes, result, grid)
-        joined = "joined" if raw.joins(task.start, task.goal) else "repaired"
+        joined = "joined" if raw.connects(task.start, task.goal) else "repaired"
         axes.set_title(f"{name}: {joined}, {1e3 * result.inference_s:.0f} ms", fontsize=9)
     figure.savefig(args.output, dpi=110)
 

@@ -25,7 +25,7 @@ from cbagan_ompl.common.files import write_json
 from cbagan_ompl.datasets.generation import ITERATIONS, RANGE, RUNS
 from cbagan_ompl.datasets.geodesic import distances
 from cbagan_ompl.datasets.rrt_labels import rrt_region
-from cbagan_ompl.datasets.synthetic import WorldSettings, detour_heat, draw_world
+from cbagan_ompl.datasets.synthetic import SyntheticSettings, detour_heat, generate_map_tasks
 from cbagan_ompl.planning.compat import ompl_version
 
 EPSILONS = (0.01, 0.02, 0.05, 0.1)
@@ -44,7 +44,7 @@ def main() -> None:
     ratios: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
     seconds: dict[str, list[float]] = defaultdict(list)
     for number in trange(args.maps):
-        world = draw_world(WorldSettings(), PART, number)
+        world = generate_map_tasks(SyntheticSettings(), PART, number)
         grid, ends = GridMap(world.maps[0]), (world.start[0], world.goal[0])
         labels, optimum = labels_of(grid, ends, number, seconds)
         for planner in PLANNERS:

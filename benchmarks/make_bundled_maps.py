@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cbagan_ompl.map_generators import FAMILIES
+from cbagan_ompl.map_generators import MAP_GENERATORS
 
 FOLDER = Path(__file__).resolve().parents[1] / "cbagan_ompl" / "maps" / "bundled"
 SEED = 4
@@ -54,7 +54,7 @@ TASKS = {
 def draw(name: str) -> NDArray[np.bool_]:
     """The map of a family that is bundled."""
     rng = np.random.default_rng([SEED, *name.encode("ascii")])
-    return FAMILIES[name](rng, *SIZES.get(name, (256, 256)))
+    return MAP_GENERATORS[name](rng, *SIZES.get(name, (256, 256)))
 
 
 def tasks_csv() -> str:

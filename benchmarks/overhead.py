@@ -19,8 +19,8 @@ from cbagan_ompl import GridMap, tasks_of
 from cbagan_ompl.benchmarking.logs import parse_log
 from cbagan_ompl.planning import compat
 from cbagan_ompl.planning.compat import og, ou
-from cbagan_ompl.planning.ompl_benchmark import Entrant, RunOptions, run_benchmark
-from cbagan_ompl.planning.problem import Ends, simple_setup
+from cbagan_ompl.planning.ompl_benchmark import PlannerVariant, RunOptions, run_benchmark
+from cbagan_ompl.planning.problem import Endpoints, simple_setup
 
 MAP, RANGE = "bundled:walls_with_gaps", 20.0
 
@@ -44,14 +44,16 @@ def main() -> None:
     )
 
 
-def inside(grid: GridMap, task: Ends, time: float, seed: int) -> tuple[int, float]:
+def inside(grid: GridMap, task: Endpoints, time: float, seed: int) -> tuple[int, float]:
     options = RunOptions(1, time, RANGE, grid.resolution, seed=seed)
-    recording = run_benchmark("x", grid, task, [Entrant("RRTstar", "uniform", None)], options)
+    recording = run_benchmark(
+        "x", grid, task, [PlannerVariant("RRTstar", "uniform", None)], options
+    )
     run = parse_log(recording.logs[0]).planners[0].runs[0]
     return int(run["iterations INTEGER"]), float(run["time REAL"])
 
 
-def outside(grid: GridMap, task: Ends, time: float, seed: int) -> int:
+def outside(grid: GridMap, task: Endpoints, time: float, seed: int) -> int:
     with compat.log_level(ou.LOG_ERROR):
         compat.seed_ompl(seed)
         setup = simple_setup(grid, task, grid.resolution)

@@ -20,7 +20,7 @@ from tqdm import trange
 from cbagan_ompl import GridMap, PlanResult, load_model, plan
 from cbagan_ompl.common.files import write_json
 from cbagan_ompl.datasets.geodesic import distances
-from cbagan_ompl.datasets.synthetic import WorldSettings, draw_world
+from cbagan_ompl.datasets.synthetic import SyntheticSettings, generate_map_tasks
 from cbagan_ompl.planning.compat import ompl_version
 
 POWERS = (0.5, 1.0, 2.0, 3.0, 4.0, 8.0)
@@ -40,7 +40,7 @@ def main() -> None:
     predictor = load_model(args.model)
     ratios: dict[str, dict[float, list[float]]] = defaultdict(lambda: defaultdict(list))
     for number in trange(args.maps):
-        world = draw_world(WorldSettings(), PART, number)
+        world = generate_map_tasks(SyntheticSettings(), PART, number)
         grid, start, goal = GridMap(world.maps[0]), world.start[0], world.goal[0]
         (u, v), (x, y) = start.astype(int).tolist(), goal.astype(int).tolist()
         optimum = float(distances(grid.free, (u, v))[y, x])

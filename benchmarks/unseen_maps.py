@@ -37,7 +37,7 @@ from cbagan_ompl.training.config import TrainingConfig
 from cbagan_ompl.training.gan import make_generator
 
 RANGE, TIME = 20.0, 2.0
-Ends = tuple[NDArray[np.float64], NDArray[np.float64]]
+Endpoints = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 def main() -> None:
@@ -69,11 +69,11 @@ def paint(
         grid, ends = one.grid, grid_ends(one)
         predictor.predict(grid, *ends)  # the first call of a size takes longer
         raw = timed(times["inference_ms"], predictor.predict, grid, *ends, repair=False)
-        kept = raw.joins(*ends)
+        kept = raw.connects(*ends)
         repaired = timed(times["kept_ms" if kept else "repair_ms"], raw.joined, *ends)
         timed(times["total_ms"], predictor.predict, grid, *ends)
         share = raw.region.sum() / grid.free.sum()
-        row = (joins(raw, *ends), joins(repaired, *ends), float(share))
+        row = (connects(raw, *ends), connects(repaired, *ends), float(share))
         rows[one.task.family or "all"].append(row)
     rows["all"] = [row for family in rows.values() for row in family]
     names = ("connected", "connected_after_repair", "share_of_free_space")
@@ -84,7 +84,7 @@ def paint(
     return regions, {name: float(np.median(values)) for name, values in times.items()}
 
 
-def joins(heatmap: Heatmap, start: NDArray[np.float64], goal: NDArray[np.float64]) -> bool:
+def connects(heatmap: Heatmap, start: NDArray[np.float64], goal: NDArray[np.float64]) -> bool:
     parts = cv2.connectedComponents(heatmap.region.astype(np.uint8), connectivity=8)[1]
     (u, v), (x, y) = heatmap.grid.to_pixel((start, goal)).astype(int).tolist()
     return bool(parts[v, u] == parts[y, x] > 0)
@@ -110,12 +110,12 @@ def sagan_ms(side: int, calls: int = 5) -> float:
     return float(np.median(times))
 
 
-def grid_ends(one: BenchmarkTask) -> Ends:
+def grid_ends(one: BenchmarkTask) -> Endpoints:
     return one.grid.check_task(one.task.start, one.task.goal)
 
 
 def wrong_heatmaps(
-    predictor: Predictor, grid: GridMap, ends: Ends, rng: np.random.Generator
+    predictor: Predictor, grid: GridMap, ends: Endpoints, rng: np.random.Generator
 ) -> dict[str, NDArray[np.float32]]:
     """Values of heat maps that are wrong on purpose."""
     values = predictor.predict(grid, *ends).values

@@ -34,7 +34,7 @@ _MARGIN, _TITLE, _LEGEND = 0.15, 0.65, 0.75
 _DOTS_PER_INCH = 150
 
 
-def save_picture(result: PlanResult, grid: GridMap, path: str | PathLike[str]) -> None:
+def save_figure(result: PlanResult, grid: GridMap, path: str | PathLike[str]) -> None:
     """Draw a plan and save it.
 
     Args:
@@ -46,7 +46,7 @@ def save_picture(result: PlanResult, grid: GridMap, path: str | PathLike[str]) -
         ConfigError: a suffix that stands for no known format, or a folder that cannot be
             written to.
     """
-    check_picture_path(path)
+    check_figure_path(path)
     figure = draw_plan(result, grid)
     try:
         figure.savefig(path, dpi=_DOTS_PER_INCH)
@@ -54,7 +54,7 @@ def save_picture(result: PlanResult, grid: GridMap, path: str | PathLike[str]) -
         raise ConfigError(f"cannot write the picture {path}: {error.strerror or error}") from error
 
 
-def check_picture_path(path: str | PathLike[str]) -> None:
+def check_figure_path(path: str | PathLike[str]) -> None:
     """Refuse a picture file of an unknown format before any work is done for it.
 
     Raises:
@@ -69,7 +69,7 @@ def check_picture_path(path: str | PathLike[str]) -> None:
 
 
 def draw_plan(result: PlanResult, grid: GridMap) -> Figure:
-    """The picture as a matplotlib figure; arguments as for :func:`save_picture`."""
+    """The picture as a matplotlib figure; arguments as for :func:`save_figure`."""
     scale = _MAP_SIDE / max(grid.shape)
     map_width, map_height = grid.width * scale, grid.height * scale
     width = max(map_width, 0.8 * _MAP_SIDE) + 2 * _MARGIN
@@ -86,7 +86,7 @@ def draw_plan(result: PlanResult, grid: GridMap) -> Figure:
 
 
 def draw_heatmap(axes: Axes, result: PlanResult, grid: GridMap) -> list[Artist]:
-    """Draw a plan on some axes; ``result`` and ``grid`` as for :func:`save_picture`.
+    """Draw a plan on some axes; ``result`` and ``grid`` as for :func:`save_figure`.
 
     Returns:
         What a legend needs.

@@ -8,7 +8,7 @@ import pytest
 from helpers.tasks import GOAL, START
 
 from cbagan_ompl import ConfigError, GridMap, plan
-from cbagan_ompl.plotting import draw_plan, save_picture
+from cbagan_ompl.plotting import draw_plan, save_figure
 
 
 def legend(result_figure: object) -> set[str]:
@@ -40,7 +40,7 @@ def test_any_aspect_and_frame(tmp_path: Path, shape: tuple[int, int]) -> None:
     grid = GridMap(np.ones(shape, bool), 0.1, (5.0, -3.0, 0.4))
     start, goal = grid.to_world([(5, 5), (shape[1] - 5, shape[0] - 5)])
     result = plan(grid, start, goal, "RRT", "straight-line", 2, seed=0, keep_tree=True)
-    save_picture(result, grid, tmp_path / "plan.png")
+    save_figure(result, grid, tmp_path / "plan.png")
     image = cv2.imread(str(tmp_path / "plan.png"))
     ratio = image.shape[0] / image.shape[1]
     assert (ratio > 1) == (shape[0] > shape[1])
@@ -49,4 +49,4 @@ def test_any_aspect_and_frame(tmp_path: Path, shape: tuple[int, int]) -> None:
 def test_bad_suffix(tmp_path: Path, two_walls: GridMap) -> None:
     result = plan(two_walls, START, GOAL, "RRT", "corridor", 5, range=20, seed=0)
     with pytest.raises(ConfigError, match=r"'plan\.txt'.*\.png"):
-        save_picture(result, two_walls, tmp_path / "plan.txt")
+        save_figure(result, two_walls, tmp_path / "plan.txt")

@@ -155,8 +155,8 @@ def _properties(record: RunRecord) -> dict[str, str]:
     solved = isfinite(record.cost)
     return {
         INFERENCE: _text(record.inference_s),
-        LEARNED: str(record.draws["learned"]),
-        UNIFORM: str(record.draws["uniform"]),
+        LEARNED: str(record.sample_counts["learned"]),
+        UNIFORM: str(record.sample_counts["uniform"]),
         CHECKS: str(record.collision_checks),
         SOLVED: str(int(solved)),
         COST: _text(record.cost),

@@ -8,8 +8,8 @@ from pathlib import Path
 from zlib import crc32
 
 from ..errors import ConfigError
-from ..planning.ompl_benchmark import Entrant, RunOptions, check_entrants, run_benchmark
-from ..planning.plan import SAMPLERS, Provider, heatmap_provider
+from ..planning.ompl_benchmark import PlannerVariant, RunOptions, check_variants, run_benchmark
+from ..planning.plan import SAMPLERS, HeatmapSource, heatmap_source
 from ..sampling.adaptation import Adaptation
 from ..sampling.heatmap import Heatmap
 from .logs import ExperimentLog, format_log, join_logs, parse_log
@@ -49,7 +49,7 @@ def check_job(job: Job) -> None:
     """
     grid, task = job.task.grid, job.task.task
     ends = grid.check_task(task.start, task.goal)
-    check_entrants(grid, ends, _entrants(job), _options(job))
+    check_variants(grid, ends, _entrants(job), _options(job))
 
 
 def check_heatmaps(job: Job) -> None:
@@ -92,11 +92,11 @@ def _options(job: Job) -> RunOptions:
     )
 
 
-def _entrants(job: Job) -> list[Entrant]:
+def _entrants(job: Job) -> list[PlannerVariant]:
     settings = job.settings
     providers = {sampler: _provider(job, sampler) for sampler in settings.samplers}
     return [
-        Entrant(
+        PlannerVariant(
             planner, sampler, provide, tuple(dict(settings.parameters.get(planner, {})).items())
         )
         for planner in settings.planners
@@ -104,7 +104,7 @@ def _entrants(job: Job) -> list[Entrant]:
     ]
 
 
-def _provider(job: Job, sampler: str) -> Provider | None:
+def _provider(job: Job, sampler: str) -> HeatmapSource | None:
     if sampler in job.settings.heatmap_dirs:
         heatmap = heatmap_file(job.settings.heatmap_dirs[sampler], job.task)
 
@@ -115,7 +115,7 @@ def _provider(job: Job, sampler: str) -> Provider | None:
     model = job.settings.models.get(sampler)
     if model is not None and sampler in set(SAMPLERS) - {LEARNED}:
         raise ConfigError(f"a model cannot be called {sampler}, this is another sampler's name")
-    return heatmap_provider(sampler if model is None else LEARNED, model)[1]
+    return heatmap_source(sampler if model is None else LEARNED, model)[1]
 
 
 def _described(log: ExperimentLog, job: Job) -> ExperimentLog:

@@ -13,7 +13,7 @@ from ..benchmarking.settings import LEARNED, Settings, parse_parameters
 from ..common.validation import check_at_least
 from ..errors import ConfigError
 from ..maps.loading import bundled_maps
-from .options import add_draw_options, add_map_options, map_options
+from .options import add_map_options, add_sampler_options, map_options
 
 _HELP = """\
 Compare samplers in OMPL's own planners, with OMPL's Benchmark, on the same tasks.
@@ -98,7 +98,7 @@ def add_benchmark_parser(commands: Any) -> None:
         help="exported model of the learned sampler (default: the bundled one); with a name, a "
         "further sampler NAME that draws from this model; may be repeated",
     )
-    add_draw_options(contest)
+    add_sampler_options(contest)
     contest.add_argument(
         "--range",
         type=float,

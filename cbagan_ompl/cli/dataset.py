@@ -14,7 +14,7 @@ from ..datasets.importing import KEEP, described, read_set, write_dataset
 from ..datasets.splits import SPLITS
 from ..datasets.synthetic import HARD_DETOUR
 from ..errors import ConfigError
-from ..map_generators import FAMILIES
+from ..map_generators import MAP_GENERATORS
 
 _HELP = """\
 Training sets: check and split one that is there, make a new one, measure how noisy labels are.
@@ -99,7 +99,7 @@ def _add_generate(actions: Any) -> None:
         type=lambda text: tuple(text.split(",")),
         default=defaults.families,
         metavar="A,B",
-        help=f"kinds of maps, taken in turn (default: all: {','.join(FAMILIES)})",
+        help=f"kinds of maps, taken in turn (default: all: {','.join(MAP_GENERATORS)})",
     )
     parser.add_argument(
         "--varied", action="store_true", help="scale, turn and wear the maps at random"

@@ -73,7 +73,7 @@ def add_evaluate_parser(commands: Any) -> None:
 
 def _evaluate(args: argparse.Namespace) -> int:
     from ..datasets.dataset import load_dataset
-    from ..evaluation.baselines import stored_predictions, trivial_predictions
+    from ..evaluation.baselines import stored_predictions, trivial_baselines
     from ..evaluation.evaluator import Evaluator
     from ..evaluation.frechet import INCEPTION_NAME, OWN_NAME, inception_features, region_features
     from ..evaluation.report import markdown
@@ -85,7 +85,7 @@ def _evaluate(args: argparse.Namespace) -> int:
     names = [str(model.record["name"]) for model in models] + [name for name, _ in stored]
     dataset = load_dataset(args.dataset)
     tasks = dataset.test if args.split == "test" else dataset.train
-    trivial = trivial_predictions(tasks)
+    trivial = trivial_baselines(tasks)
     _check_names([*names, *trivial])
     if args.output is not None:
         _make_folder(Path(args.output))
@@ -147,7 +147,7 @@ def _make_folder(folder: Path) -> None:
 def _save(
     folder: Path, result: dict[str, Any], table: str, evaluations: list[Evaluation], tasks: Tasks
 ) -> None:
-    from ..evaluation.sample_grid import save_contact_sheet
+    from ..evaluation.sample_grid import save_sample_grid
 
     try:
         (folder / "evaluation.md").write_text(table, encoding="utf-8")
@@ -155,4 +155,4 @@ def _save(
         raise ConfigError(f"cannot write to {folder}: {error.strerror or error}") from error
     write_json(str(folder / "evaluation.json"), result)
     for one in evaluations:
-        save_contact_sheet(one, tasks, folder / f"{one.name}.png")
+        save_sample_grid(one, tasks, folder / f"{one.name}.png")

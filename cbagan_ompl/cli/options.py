@@ -32,7 +32,7 @@ def map_options(args: argparse.Namespace) -> dict[str, Any]:
     return options
 
 
-def add_draw_options(parser: Any) -> None:
+def add_sampler_options(parser: Any) -> None:
     """Add the options to a parser or a group of one."""
     parser.add_argument(
         "--uniform-fraction",

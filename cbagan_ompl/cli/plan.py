@@ -12,7 +12,7 @@ from ..maps.loading import bundled_maps
 from ..maps.tasks import tasks_of
 from ..sampling.adaptation import Adaptation
 from ..sampling.heatmap import Heatmap
-from .options import add_draw_options, add_map_options, map_options
+from .options import add_map_options, add_sampler_options, map_options
 
 _PLAN_HELP = """\
 Plan a path on a map with one of OMPL's planners.
@@ -79,7 +79,7 @@ def add_plan_parser(commands: Any) -> None:
     sampler.add_argument(
         "--heatmap", metavar="FILE", help="draw from this image or .npy instead of a model's"
     )
-    add_draw_options(sampler)
+    add_sampler_options(sampler)
 
     output = parser.add_argument_group("output")
     output.add_argument("--output", metavar="FILE", help="picture of the plan (.png, .pdf, .svg)")
@@ -98,10 +98,10 @@ def _point(text: str) -> tuple[float, float]:
 
 def _plan(args: argparse.Namespace) -> int:
     from ..planning.plan import plan
-    from ..plotting import check_picture_path, save_picture
+    from ..plotting import check_figure_path, save_figure
 
     if args.output is not None:
-        check_picture_path(args.output)
+        check_figure_path(args.output)
     check_folder(args.output)
     grid = GridMap.load(args.map, **map_options(args))
     start, goal = _ends(args, grid)
@@ -128,7 +128,7 @@ def _plan(args: argparse.Namespace) -> int:
     if args.json is not None:
         write_json(args.json, values)
     if args.output is not None:
-        save_picture(result, grid, args.output)
+        save_figure(result, grid, args.output)
     _print_summary(values, args.output)
     return 0 if result.solved else 1
 

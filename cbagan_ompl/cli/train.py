@@ -12,10 +12,10 @@ import yaml
 from ..common.files import write_json
 from ..common.validation import check_at_least, require_torch
 from ..datasets.dataset import load_dataset
-from ..datasets.synthetic import HARD_DETOUR, TASKS_PER_MAP, WorldSettings
+from ..datasets.synthetic import HARD_DETOUR, TASKS_PER_MAP, SyntheticSettings
 from ..errors import ConfigError
 from ..training.config import NETWORKS, PRESETS, TrainingConfig
-from ..training.task_sources import DatasetSource, TaskSource, WorldSchedule, world_source
+from ..training.task_sources import DatasetSource, SyntheticSchedule, TaskSource, synthetic_source
 
 _TRAIN_HELP = """\
 Train the networks on a data set or on worlds without end, and keep the best epoch.
@@ -102,7 +102,7 @@ def add_train_parser(subparsers: Any) -> None:
 
 
 def _add_world_options(group: Any) -> None:
-    settings, schedule = WorldSettings(), WorldSchedule()
+    settings, schedule = SyntheticSettings(), SyntheticSchedule()
     for name, default, what in (
         ("--size", settings.size, "side of the maps in pixels"),
         ("--maps", schedule.maps, f"maps for each epoch, {TASKS_PER_MAP} tasks on each"),
@@ -219,8 +219,8 @@ def _source(args: argparse.Namespace, config: TrainingConfig) -> AbstractContext
         from ..training.batches import check_trainable
 
         check_trainable(args.size, config)
-        settings = WorldSettings(args.size, args.families, args.hard_share, args.world_seed)
-        return world_source(settings, WorldSchedule(args.maps, args.held_back, args.jobs))
+        settings = SyntheticSettings(args.size, args.families, args.hard_share, args.world_seed)
+        return synthetic_source(settings, SyntheticSchedule(args.maps, args.held_back, args.jobs))
     dataset = load_dataset(args.dataset)
     return nullcontext(DatasetSource(dataset, config.validation_fraction, config.seed))
 

@@ -17,7 +17,7 @@ def check_at_least(name: str, value: int, least: int) -> None:
         raise ConfigError(f"{name} must be at least {least}, got {value}")
 
 
-def check_share(name: str, value: float) -> None:
+def check_fraction(name: str, value: float) -> None:
     """Refuse a number that is no share of anything.
 
     Raises:

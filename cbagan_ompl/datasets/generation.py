@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 
 from ..common.files import write_json
 from ..common.parallel import run_all
-from ..common.validation import check_at_least, check_share, require
+from ..common.validation import check_at_least, check_fraction, require
 from ..errors import ConfigError, DatasetError
-from ..map_generators import FAMILIES, MIN_SIDE, check_families
-from ..map_generators.randomization import world_map
+from ..map_generators import MAP_GENERATORS, MIN_SIDE, check_generators
+from ..map_generators.randomization import randomized_map
 from ..maps.grid_map import GridMap
-from ..sampling.heatmap import REGION_BORDER, pixel_pair
+from ..sampling.heatmap import REGION_THRESHOLD, pixel_pair
 from .augmentation import augmented
 from .dataset import Tasks
 from .splits import is_test_task
@@ -52,7 +52,7 @@ class GenerationSettings:
         maps: number of maps.
         tasks: on each map.
         size: side of the maps in pixels.
-        families: names from :data:`cbagan_ompl.map_generators.FAMILIES`, taken in turn.
+        families: names from :data:`cbagan_ompl.map_generators.MAP_GENERATORS`, taken in turn.
         varied: scale, turn and wear each original, see
             :mod:`cbagan_ompl.map_generators.randomization`.
         copies: maps from each original; the first is the original itself, the others are
@@ -76,7 +76,7 @@ class GenerationSettings:
     maps: int = 100
     tasks: int = 100
     size: int = 64
-    families: tuple[str, ...] = tuple(FAMILIES)
+    families: tuple[str, ...] = tuple(MAP_GENERATORS)
     varied: bool = False
     copies: int = 1
     label: str = LABELS[0]
@@ -92,10 +92,10 @@ class GenerationSettings:
         for name in ("maps", "tasks", "copies", "runs"):
             check_at_least(name, getattr(self, name), 1)
         check_at_least("size", self.size, MIN_SIDE)
-        check_families(self.families)
+        check_generators(self.families)
         if self.label not in LABELS:
             raise ConfigError(f"a label is one of {', '.join(LABELS)}, got {self.label!r}")
-        check_share("hard_share", self.hard_share)
+        check_fraction("hard_share", self.hard_share)
         if self.range is not None and not 0 < self.range < float("inf"):
             raise ConfigError(f"range must be above 0, got {self.range}")
         if not 0 <= self.min_distance < 1:
@@ -209,9 +209,9 @@ def draw_map(settings: GenerationSettings, number: int) -> NDArray[np.bool_]:
     family = settings.families[original % len(settings.families)]
     rng = np.random.default_rng((settings.seed, original))
     if settings.varied:
-        free = world_map(rng, settings.size, [family])
+        free = randomized_map(rng, settings.size, [family])
     else:
-        free = FAMILIES[family](rng, settings.size, settings.size)
+        free = MAP_GENERATORS[family](rng, settings.size, settings.size)
     return augmented(free, np.random.default_rng((settings.seed, original, copy))) if copy else free
 
 
@@ -255,7 +255,7 @@ def _label(
 
         start, goal = pixel_pair(ends)
         fields = distances(grid.free, start), distances(grid.free, goal)
-        return detour_heat(*fields, goal) >= REGION_BORDER
+        return detour_heat(*fields, goal) >= REGION_THRESHOLD
     from .rrt_labels import rrt_region
 
     task = grid.check_task(*ends)

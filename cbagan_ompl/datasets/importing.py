@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..common.validation import check_at_least
 from ..errors import ConfigError, DatasetError
-from ..evaluation.metrics import joins
+from ..evaluation.metrics import connects
 from .dataset import Dataset, Tasks, load_dataset
 from .splits import is_test_task
 from .writing import task_row, write_lists, write_map, write_tasks
@@ -120,7 +120,7 @@ def _ends(tasks: Tasks, i: int) -> tuple[tuple[int, int], tuple[int, int]]:
 
 def _is_joined(tasks: Tasks, i: int) -> bool:
     inside = (tasks.region[i] & tasks.maps[tasks.map_of[i]]).astype(np.bool_)
-    return joins(inside, *_ends(tasks, i))
+    return connects(inside, *_ends(tasks, i))
 
 
 def _is_blocked(tasks: Tasks, i: int) -> bool:

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from ..maps.grid_map import GridMap
 from ..planning import compat
 from ..planning.compat import og, ou
-from ..planning.problem import Ends, checked_path, simple_setup
+from ..planning.problem import Endpoints, checked_path, simple_setup
 
 # A path passes a pixel when one of the points that lie this far apart on it does, in pixels.
 _SPACING = 0.25
 
 
 def rrt_region(
-    grid: GridMap, task: Ends, runs: int, range: float, iterations: int, seed: int
+    grid: GridMap, task: Endpoints, runs: int, range: float, iterations: int, seed: int
 ) -> NDArray[np.bool_]:
     """The pixels that the paths of some runs of OMPL's RRT pass: the label of the paper.
 

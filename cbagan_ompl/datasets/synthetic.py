@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.validation import check_at_least, check_share
-from ..map_generators import FAMILIES, MIN_SIDE, check_families
-from ..map_generators.randomization import world_map
+from ..common.validation import check_at_least, check_fraction
+from ..map_generators import MAP_GENERATORS, MIN_SIDE, check_generators
+from ..map_generators.randomization import randomized_map
 from .dataset import Tasks
 
 #: Relative detour at the border of the region, see :func:`detour_heat`.
@@ -32,12 +32,12 @@ _MIN_DISTANCE = 0.2
 
 
 @dataclass(frozen=True)
-class WorldSettings:
+class SyntheticSettings:
     """What decides the tasks.
 
     Attributes:
         size: side of the maps in pixels.
-        families: names from :data:`cbagan_ompl.map_generators.FAMILIES`, all equally likely.
+        families: names from :data:`cbagan_ompl.map_generators.MAP_GENERATORS`, all equally likely.
         hard_share: share of hard tasks (:data:`HARD_DETOUR`), where the maps have that many.
         seed: of everything.
 
@@ -46,14 +46,14 @@ class WorldSettings:
     """
 
     size: int = 256
-    families: tuple[str, ...] = tuple(FAMILIES)
+    families: tuple[str, ...] = tuple(MAP_GENERATORS)
     hard_share: float = 0.65
     seed: int = 0
 
     def __post_init__(self) -> None:
         check_at_least("size", self.size, MIN_SIDE)
-        check_families(self.families)
-        check_share("hard_share", self.hard_share)
+        check_generators(self.families)
+        check_fraction("hard_share", self.hard_share)
         check_at_least("seed", self.seed, 0)
 
     def description(self) -> dict[str, Any]:
@@ -62,7 +62,7 @@ class WorldSettings:
         return asdict(self) | {"families": list(self.families), "label": label}
 
 
-def draw_world(settings: WorldSettings, part: int, number: int) -> Tasks:
+def generate_map_tasks(settings: SyntheticSettings, part: int, number: int) -> Tasks:
     """A map with its tasks.
 
     Args:
@@ -75,7 +75,7 @@ def draw_world(settings: WorldSettings, part: int, number: int) -> Tasks:
 
     rng = np.random.default_rng((settings.seed, part, number))
     while True:
-        free = world_map(rng, settings.size, settings.families)
+        free = randomized_map(rng, settings.size, settings.families)
         points = _points(free, rng)
         fields = np.stack([distances(free, (u, v)) for u, v in points.tolist()])
         pairs = _chosen_pairs(points, fields, settings, rng)
@@ -119,7 +119,7 @@ def detour_heat(
     return heat
 
 
-def joined_tasks(worlds: list[Tasks]) -> Tasks:
+def concatenate_tasks(worlds: list[Tasks]) -> Tasks:
     """The tasks of several maps as one set."""
     return Tasks(
         np.concatenate([world.maps for world in worlds]),
@@ -140,7 +140,7 @@ def _points(free: NDArray[np.bool_], rng: np.random.Generator) -> NDArray[np.int
 def _chosen_pairs(
     points: NDArray[np.intp],
     fields: NDArray[np.float32],
-    settings: WorldSettings,
+    settings: SyntheticSettings,
     rng: np.random.Generator,
 ) -> list[tuple[int, int]]:
     """Start and goal of each task as numbers of points; fewer where the map has too few."""

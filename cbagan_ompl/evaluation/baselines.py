@@ -19,7 +19,7 @@ LINE_HALF_WIDTH = 3
 RESULTS, _COLUMNS = "results.csv", ("true_roi", "pred_roi")
 
 
-def trivial_predictions(tasks: Tasks) -> dict[str, NDArray[np.bool_]]:
+def trivial_baselines(tasks: Tasks) -> dict[str, NDArray[np.bool_]]:
     """Two predictors that know nothing: all free space, and a straight band; (N, S, S) each."""
     bands = np.zeros_like(tasks.region)
     for band, start, goal in zip(bands, tasks.start, tasks.goal, strict=True):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..datasets.dataset import Tasks
 from ..errors import DatasetError
-from ..sampling.heatmap import REGION_BORDER
+from ..sampling.heatmap import REGION_THRESHOLD
 from .bootstrap import interval, resampled_weights
 from .frechet import frechet_distance
 from .metrics import TaskScores, task_scores
@@ -122,7 +122,7 @@ class Evaluator:
         values = predictor.probabilities(
             self._free[batch], self.tasks.start[batch], self.tasks.goal[batch]
         )
-        return np.asarray(values >= REGION_BORDER)
+        return np.asarray(values >= REGION_THRESHOLD)
 
     def _time_single(self, predictor: Predictor) -> float:
         seconds = []

@@ -58,7 +58,7 @@ def confusion(predicted: NDArray[np.bool_], truth: NDArray[np.bool_]) -> Confusi
     )
 
 
-def joins(
+def connects(
     region: NDArray[np.bool_], start: tuple[int, int], goal: tuple[int, int], connectivity: int = 8
 ) -> bool:
     """Whether one connected part of the region holds both start and goal.
@@ -139,7 +139,7 @@ def task_scores(
 
     def joined(connectivity: int) -> NDArray[np.bool_]:
         return np.array(
-            [joins(mask, *pair, connectivity) for mask, pair in zip(inside, ends, strict=True)]
+            [connects(mask, *pair, connectivity) for mask, pair in zip(inside, ends, strict=True)]
         )
 
     return TaskScores(

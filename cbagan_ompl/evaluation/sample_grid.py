@@ -21,7 +21,7 @@ _START, _GOAL = "#0072B2", "#D55E00"
 _CASES = 3
 
 
-def save_contact_sheet(evaluation: Evaluation, tasks: Tasks, path: Path) -> None:
+def save_sample_grid(evaluation: Evaluation, tasks: Tasks, path: Path) -> None:
     """Draw three best, three middling and three worst tasks by IoU.
 
     Args:

@@ -90,7 +90,7 @@ class Predictor:
             start: (x, y), world.
             goal: (x, y), world.
             repair: join the parts of the region where it falls apart between start and goal, see
-                :meth:`Heatmap.joined`; without it the heat map is as the network left it.
+                :meth:`Heatmap.connected`; without it the heat map is as the network left it.
 
         Raises:
             TaskError: see :meth:`GridMap.check_task`.
@@ -101,7 +101,7 @@ class Predictor:
         values = self.probabilities(scaled_free(grid.free, shape)[None], *scaled_ends[:, None])[0]
         full = cv2.resize(values, grid.shape[::-1], interpolation=cv2.INTER_LINEAR)
         heatmap = Heatmap(np.clip(full, _FLOOR, 1), grid)
-        return heatmap.joined(start, goal) if repair else heatmap
+        return heatmap.connected(start, goal) if repair else heatmap
 
     def probabilities(
         self, free: NDArray[np.bool_], start: NDArray[np.floating], goal: NDArray[np.floating]

@@ -29,17 +29,17 @@ from .shapes import MIN_SIDE, Mask, without_pockets
 from .terrain import blocked_cells, caves, city, curved_walls, race_track
 
 __all__ = [
-    "FAMILIES",
+    "MAP_GENERATORS",
     "MIN_SIDE",
     "Mask",
     "bug_trap",
-    "check_families",
+    "check_generators",
     "narrow_passage",
     "without_pockets",
 ]
 
 #: Every family by its name.
-FAMILIES: dict[str, Callable[[np.random.Generator, int, int], Mask]] = {
+MAP_GENERATORS: dict[str, Callable[[np.random.Generator, int, int], Mask]] = {
     "blocked_cells": blocked_cells,
     "blocks": blocks,
     "bug_trap": bug_trap,
@@ -64,16 +64,16 @@ FAMILIES: dict[str, Callable[[np.random.Generator, int, int], Mask]] = {
 }
 
 
-def check_families(names: Sequence[str]) -> None:
+def check_generators(names: Sequence[str]) -> None:
     """Refuse a list of families that is empty or names one that is not there.
 
     Raises:
         ConfigError: it is; the message lists those that are.
     """
-    unknown = [name for name in names if name not in FAMILIES]
+    unknown = [name for name in names if name not in MAP_GENERATORS]
     if not names:
-        raise ConfigError(f"no map family is named; there are {', '.join(FAMILIES)}")
+        raise ConfigError(f"no map family is named; there are {', '.join(MAP_GENERATORS)}")
     if unknown:
         raise ConfigError(
-            f"unknown map family {', '.join(unknown)!r}; there are {', '.join(FAMILIES)}"
+            f"unknown map family {', '.join(unknown)!r}; there are {', '.join(MAP_GENERATORS)}"
         )

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from . import FAMILIES
+from . import MAP_GENERATORS
 from .shapes import MIN_SIDE, Mask, frame, without_pockets
 
 # How often each change is made.
@@ -18,7 +18,7 @@ _COARSE, _NARROW, _TURNED, _FRAMED, _RAGGED, _SPECKLED = 0.5, 0.4, 0.4, 0.4, 0.2
 _LEAST_FREE = 0.12
 
 
-def world_map(rng: np.random.Generator, side: int, families: Sequence[str]) -> Mask:
+def randomized_map(rng: np.random.Generator, side: int, families: Sequence[str]) -> Mask:
     """A square map of a random family, changed at random.
 
     It may be drawn with fewer pixels and enlarged, so that its edges are steps; be narrower than
@@ -46,7 +46,7 @@ def _drawn(rng: np.random.Generator, family: str, side: int) -> Mask:
         int(rng.integers(max(MIN_SIDE, long // 2), long + 1)) if rng.random() < _NARROW else long
     )
     width, height = (long, short) if rng.random() < 0.5 else (short, long)
-    free = FAMILIES[family](rng, width, height)
+    free = MAP_GENERATORS[family](rng, width, height)
     if rng.random() < _FRAMED:
         frame(free, int(rng.integers(1, 4)))
     shape = round(side * width / long), round(side * height / long)

@@ -80,7 +80,7 @@ class GridMap:
                 f"{name}: a map is a 2-D array (H, W) of at least one pixel, "
                 f"this one has shape {cells.shape}"
             )
-        check_side(cells.shape[1], cells.shape[0], name)
+        check_map_size(cells.shape[1], cells.shape[0], name)
         if cells.dtype.kind not in "buif":
             raise MapError(f"{name}: a map holds booleans or numbers, not {cells.dtype}")
         if cells.dtype.kind == "f" and not np.isfinite(cells).all():
@@ -315,7 +315,7 @@ def _is_number(value: object) -> bool:
     return isinstance(value, SupportsFloat) and isfinite(value)
 
 
-def check_side(width: int, height: int, name: str) -> None:
+def check_map_size(width: int, height: int, name: str) -> None:
     """Refuse maps too large to plan on.
 
     Raises:

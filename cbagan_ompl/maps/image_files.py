@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import MapError
-from .grid_map import check_side
+from .grid_map import check_map_size
 
-#: Suffixes of the files that :func:`decode_picture` reads, in lower case.
+#: Suffixes of the files that :func:`decode_image` reads, in lower case.
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".pgm")
 
 
-class Picture(NamedTuple):
+class DecodedImage(NamedTuple):
     """A decoded picture.
 
     Attributes:
@@ -32,7 +32,7 @@ class Picture(NamedTuple):
     opaque: NDArray[np.bool_] | None
 
 
-def decode_picture(data: bytes, name: str) -> Picture:
+def decode_image(data: bytes, name: str) -> DecodedImage:
     """Decode a picture file, told by its first bytes.
 
     Pixels are taken as stored: a rotation that the EXIF data ask for is not applied.
@@ -59,7 +59,7 @@ def decode_picture(data: bytes, name: str) -> Picture:
         size, whole = _measure_bmp(data)
     else:
         raise MapError(f"{name}: the content is no PNG, JPEG, BMP or PGM picture")
-    check_side(*size, name)
+    check_map_size(*size, name)
     if not whole:
         raise MapError(f"{name}: the picture is truncated, get a complete copy of the file")
     try:
@@ -71,10 +71,10 @@ def decode_picture(data: bytes, name: str) -> Picture:
         raise MapError(f"{name}: the picture is damaged or of a kind that OpenCV cannot decode")
     white = 255 if pixels.dtype == np.uint8 else 65535
     if pixels.ndim == 2:
-        return Picture(pixels.astype(np.uint16), white, None)
+        return DecodedImage(pixels.astype(np.uint16), white, None)
     opaque = pixels[..., 3] == white if pixels.shape[2] == 4 else None
     colours = np.ascontiguousarray(pixels[..., :3])
-    return Picture(cv2.cvtColor(colours, cv2.COLOR_BGR2GRAY).astype(np.uint16), white, opaque)
+    return DecodedImage(cv2.cvtColor(colours, cv2.COLOR_BGR2GRAY).astype(np.uint16), white, opaque)
 
 
 # Each of the next three returns (width, height) as the header gives them, (0, 0) if it is cut off,
@@ -123,7 +123,7 @@ def _measure_bmp(data: bytes) -> tuple[tuple[int, int], bool]:
     return (width, height), len(data) >= max(start, 26) + length
 
 
-def _decode_pgm(data: bytes, name: str) -> Picture:
+def _decode_pgm(data: bytes, name: str) -> DecodedImage:
     """Decode a PGM, plain (P2) or raw (P5), with comments and any brightest level to 65535.
 
     Not by OpenCV, which scales some of the brightest levels other than 255 and some not.
@@ -138,7 +138,7 @@ def _decode_pgm(data: bytes, name: str) -> Picture:
             "brightest gray level"
         )
     kind, width, height, white = (int(number) for number in header.groups())
-    check_side(width, height, name)
+    check_map_size(width, height, name)
     if not (width and height and 0 < white < 65536):
         raise MapError(
             f"{name}: {width} x {height} pixels with gray levels up to {white} are no PGM; the "
@@ -162,4 +162,4 @@ def _decode_pgm(data: bytes, name: str) -> Picture:
     levels = levels[: width * height]
     if levels.min() < 0 or levels.max() > white:
         raise MapError(f"{name}: the PGM holds gray levels outside 0 to {white}")
-    return Picture(levels.astype(np.uint16).reshape(height, width), white, None)
+    return DecodedImage(levels.astype(np.uint16).reshape(height, width), white, None)

@@ -13,7 +13,7 @@ import numpy as np
 from ..common.files import read_bytes
 from ..errors import ConfigError, MapError
 from .grid_map import GridMap
-from .image_files import SUFFIXES, decode_picture
+from .image_files import SUFFIXES, decode_image
 from .movingai import load_movingai_map
 from .ros import load_ros_map
 
@@ -103,7 +103,7 @@ def _load_bundled(name: str, settings: MapOptions) -> GridMap:
 
 
 def _picture_map(data: bytes, place: str, name: str, settings: MapOptions) -> GridMap:
-    gray, white, opaque = decode_picture(data, place)
+    gray, white, opaque = decode_image(data, place)
     free = (np.arange(white + 1) / white >= settings.threshold)[gray]
     if opaque is not None:
         free = free | ~opaque if settings.unknown_is_free else free & opaque

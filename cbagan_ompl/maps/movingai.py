@@ -12,7 +12,7 @@ import numpy as np
 
 from ..common.files import read_text
 from ..errors import MapError
-from .grid_map import GridMap, check_side
+from .grid_map import GridMap, check_map_size
 
 _FREE = ".GS"
 _BLOCKED = "@OTW"
@@ -42,7 +42,7 @@ def load_movingai_map(path: Path) -> GridMap:
             f"'width N' and 'map', they are {[line[:40] for line in lines[:4]]}"
         )
     height, width = (_count(path, lines, key) for key in ("height", "width"))
-    check_side(width, height, str(path))
+    check_map_size(width, height, str(path))
 
     rows = [line.rstrip() for line in lines[4:]]
     while len(rows) > height and not rows[-1]:

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from ..common.files import read_bytes
 from ..errors import MapError
 from .grid_map import GridMap
-from .image_files import Picture, decode_picture
+from .image_files import DecodedImage, decode_image
 
 _REQUIRED = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
 _MODES = ("trinary", "scale", "raw")
@@ -112,13 +112,13 @@ class _Description:
         return mode.lower()
 
     @property
-    def picture(self) -> Picture:
+    def picture(self) -> DecodedImage:
         image = self.keys["image"]
         if not isinstance(image, str) or not image:
             raise self.error("image", "must be the path of a picture, relative to this file")
         path = self.path.parent / image
         try:
-            return decode_picture(read_bytes(path), str(path))
+            return decode_image(read_bytes(path), str(path))
         except MapError as error:
             raise self.error("image", str(error)) from error
 

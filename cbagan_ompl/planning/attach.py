@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import PlannerError
 from ..sampling.adaptation import FULL_ADAPTATION, Adaptation, Trust
 from ..sampling.heatmap import Heatmap
-from ..sampling.sampler import DEFAULT_UNIFORM_FRACTION, OPTIMIZING_SHARPNESS, DrawStream
+from ..sampling.sampler import DEFAULT_UNIFORM_FRACTION, OPTIMIZING_SHARPNESS, HeatmapSampler
 from . import compat
 from . import ompl_samplers as samplers
 from .compat import ob, ou
@@ -25,8 +25,8 @@ from .hooks import (
     VALID_STATE_SAMPLER,
     hook_of,
 )
-from .monitor import PlannerProgress, is_followed
-from .states import Positions, bounds_of, positions_of
+from .monitor import PlannerMonitor, is_followed
+from .states import StateAccess, position_bounds, state_access
 
 # OMPL's range of a planner that was given none, as a share of the extent of the space.
 _OMPL_RANGE = 0.2
@@ -41,15 +41,15 @@ class Attachment:
         hook: name of the hook in use.
     """
 
-    def __init__(self, hook: str, stream: DrawStream, undo: Callable[[], None]) -> None:
+    def __init__(self, hook: str, stream: HeatmapSampler, undo: Callable[[], None]) -> None:
         self.hook = hook
         self._stream = stream
         self._undo: Callable[[], None] | None = undo
 
     @property
-    def draws(self) -> dict[str, int]:
+    def sample_counts(self) -> dict[str, int]:
         """Draws that the planner has had so far: ``{"learned": n, "uniform": m}``."""
-        return self._stream.draws
+        return self._stream.sample_counts
 
     def detach(self) -> None:
         """Give the planner back as it was before.
@@ -102,7 +102,7 @@ def attach(
             :data:`cbagan_ompl.sampling.sampler.OPTIMIZING_SHARPNESS` for those that go on.
 
     Returns:
-        A handle with ``.hook``, ``.draws`` and ``.detach()``.
+        A handle with ``.hook``, ``.sample_counts`` and ``.detach()``.
 
     Raises:
         PlannerError: no planner is set, no hook of this build reaches it, it draws from a heat
@@ -118,14 +118,14 @@ def attach(
     hook = hook_of(name)
     if sharpness is None:
         sharpness = 1.0 if name in STOP_AT_FIRST else OPTIMIZING_SHARPNESS
-    stream = DrawStream(heatmap, uniform_fraction, seed, sharpness)
+    stream = HeatmapSampler(heatmap, uniform_fraction, seed, sharpness)
     space = setup.getStateSpace()
-    positions = positions_of(space, stream.rng)
-    stream.keep_inside(*bounds_of(space))
+    positions = state_access(space, stream.rng)
+    stream.keep_inside(*position_bounds(space))
     # Samplers and solutions that are there already would keep the planner from asking for draws.
     planner.clear()
     setup.getProblemDefinition().clearSolutionPaths()
-    progress = PlannerProgress(setup, positions)
+    progress = PlannerMonitor(setup, positions)
     stream.follow(progress.best_cost, progress.informed_set if _is_informed(planner) else None)
     parts = _Parts(setup, planner, name, positions, stream, progress, adaptation)
     undo_hook = _INSTALL[hook](parts)
@@ -175,9 +175,9 @@ class _Parts:
     setup: Any
     planner: Any
     name: str
-    positions: Positions
-    stream: DrawStream
-    progress: PlannerProgress
+    positions: StateAccess
+    stream: HeatmapSampler
+    progress: PlannerMonitor
     adaptation: Adaptation
 
 

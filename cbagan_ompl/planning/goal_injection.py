@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from ..sampling.adaptation import Trust
-from ..sampling.sampler import DrawStream
+from ..sampling.sampler import HeatmapSampler
 from .compat import ob
-from .monitor import PlannerProgress
-from .states import Positions
+from .monitor import PlannerMonitor
+from .states import StateAccess
 
 # What RRT-like planners compare their number of goal states with: never enough.
 _ENDLESS = 10**9
@@ -37,9 +37,9 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
         self,
         si: Any,
         original: Any,
-        positions: Positions,
-        stream: DrawStream,
-        progress: PlannerProgress,
+        positions: StateAccess,
+        stream: HeatmapSampler,
+        progress: PlannerMonitor,
         trust: Trust,
     ) -> None:
         super().__init__(si)
@@ -74,7 +74,7 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
         progress.note_sample()
         if sampling and not self._began:
             self._began = True
-            self._trust.begin(progress.joins(self._stream.heatmap))
+            self._trust.begin(progress.connects(self._stream.heatmap))
         if not sampling or (not progress.has_solution and self._is_goals_turn()):
             self._original.sampleGoal(state)
         else:

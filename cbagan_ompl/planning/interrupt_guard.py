@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import Any
 
 
-class Guard:
+class InterruptGuard:
     """A context for calls of OMPL that no exception may cut through.
 
     While OMPL's Benchmark watches a planner from a second thread, an exception that leaves a
@@ -36,7 +36,7 @@ class Guard:
 
         return guarded
 
-    def __enter__(self) -> Guard:
+    def __enter__(self) -> InterruptGuard:
         self._before = signal.signal(signal.SIGINT, self._interrupt)
         return self
 

@@ -13,13 +13,13 @@ import numpy as np
 from ..sampling.heatmap import Heatmap
 from ..sampling.sampler import InformedSet
 from .compat import best_cost, new_state, ob, planner_data, start_states, typed_state
-from .states import Positions
+from .states import StateAccess
 
 # A goal region without end is represented by this many samples of it in the informed set.
 _MAX_GOALS = 100
 
 
-class PlannerProgress:
+class PlannerMonitor:
     """The state of a planner, read through the only references that callbacks have to it.
 
     A callback that refers to its planner closes a reference cycle through C++, which no garbage
@@ -34,7 +34,7 @@ class PlannerProgress:
         positions: access to the positions of its states.
     """
 
-    def __init__(self, setup: Any, positions: Positions) -> None:
+    def __init__(self, setup: Any, positions: StateAccess) -> None:
         self._planner = setup.getPlanner()
         self._problem = setup.getProblemDefinition()
         self._goal = setup.getGoal()
@@ -102,10 +102,10 @@ class PlannerProgress:
         starts = [self._positions.read(start) for start in start_states(self._planner)]
         return InformedSet(np.array(starts), np.array(goals), self._goal.getThreshold())
 
-    def joins(self, heatmap: Heatmap) -> bool:
+    def connects(self, heatmap: Heatmap) -> bool:
         """Whether a region joins a start with a goal, once the planner has begun to plan."""
         ends = self._ends()
-        return any(heatmap.joins(start, goal) for start in ends.starts for goal in ends.goals)
+        return any(heatmap.connects(start, goal) for start in ends.starts for goal in ends.goals)
 
     def nodes(self) -> int:
         """Number of nodes of the tree."""
@@ -157,7 +157,7 @@ def is_followed(planner: Any) -> bool:
     return any(progress.refers_to(planner) for progress in _alive)
 
 
-_alive: weakref.WeakSet[PlannerProgress] = weakref.WeakSet()
+_alive: weakref.WeakSet[PlannerMonitor] = weakref.WeakSet()
 
 
 @atexit.register

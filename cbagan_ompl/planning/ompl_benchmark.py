@@ -20,10 +20,10 @@ from . import compat
 from .attach import Attachment, attach
 from .compat import ou
 from .hooks import hook_of
-from .interrupt_guard import Guard
+from .interrupt_guard import InterruptGuard
 from .monitor import CostHistory
-from .plan import Provider
-from .problem import Ends, checked_path, path_length, set_parameter, set_range, simple_setup
+from .plan import HeatmapSource
+from .problem import Endpoints, checked_path, path_length, set_parameter, set_range, simple_setup
 from .validity import GridMotionValidator, GridValidityChecker
 
 # Collision checks between two looks at the best cost: about six iterations of RRT*, half a
@@ -37,7 +37,7 @@ _MEMORY_MB = 8192.0
 
 
 @dataclass(frozen=True)
-class Entrant:
+class PlannerVariant:
     """A planner with a sampler, as one of the planners of a Benchmark.
 
     Attributes:
@@ -49,7 +49,7 @@ class Entrant:
 
     planner: str
     sampler: str
-    provide: Provider | None
+    provide: HeatmapSource | None
     parameters: tuple[tuple[str, Any], ...] = ()
 
     @property
@@ -72,7 +72,7 @@ class RunRecord:
     """
 
     inference_s: float
-    draws: dict[str, int]
+    sample_counts: dict[str, int]
     collision_checks: int
     cost: float
     costs: list[tuple[float, float]]
@@ -118,8 +118,8 @@ class RunOptions:
     seed: int = 0
 
 
-def check_entrants(
-    grid: GridMap, task: Ends, entrants: Sequence[Entrant], options: RunOptions
+def check_variants(
+    grid: GridMap, task: Endpoints, entrants: Sequence[PlannerVariant], options: RunOptions
 ) -> None:
     """Refuse entrants that cannot run; arguments as for :func:`run_benchmark`.
 
@@ -127,7 +127,7 @@ def check_entrants(
         PlannerError: an unknown planner, or one that no hook reaches on this OMPL.
         ConfigError: a parameter that a planner does not have.
     """
-    _Contest(grid, task, entrants, options, Guard())
+    BenchmarkSession(grid, task, entrants, options, InterruptGuard())
     for entrant in entrants:
         if entrant.provide is not None:
             hook_of(entrant.planner)
@@ -136,8 +136,8 @@ def check_entrants(
 def run_benchmark(
     name: str,
     grid: GridMap,
-    task: Ends,
-    entrants: Sequence[Entrant],
+    task: Endpoints,
+    entrants: Sequence[PlannerVariant],
     options: RunOptions,
     after_round: Callable[[], None] = lambda: None,
 ) -> Recording:
@@ -160,9 +160,9 @@ def run_benchmark(
         ConfigError: a parameter that a planner does not have.
         KeyboardInterrupt: after an interrupt, once the run that it came in is over.
     """
-    with compat.log_level(ou.LOG_ERROR), TemporaryDirectory() as folder, Guard() as guard:
+    with compat.log_level(ou.LOG_ERROR), TemporaryDirectory() as folder, InterruptGuard() as guard:
         compat.seed_ompl(options.seed)
-        contest = _Contest(grid, task, entrants, options, guard)
+        contest = BenchmarkSession(grid, task, entrants, options, guard)
         benchmark = compat.new_benchmark(
             contest.setup, name, guard.wrap(contest.before_run), guard.wrap(contest.after_run)
         )
@@ -193,16 +193,16 @@ def _one_run(time: float) -> Any:
     return request
 
 
-class _Contest:
+class BenchmarkSession:
     """The entrants on one setup, and the events around their runs."""
 
     def __init__(
         self,
         grid: GridMap,
-        task: Ends,
-        entrants: Sequence[Entrant],
+        task: Endpoints,
+        entrants: Sequence[PlannerVariant],
         options: RunOptions,
-        guard: Guard,
+        guard: InterruptGuard,
     ) -> None:
         self.setup = simple_setup(grid, task, options.tolerance)
         si = self.setup.getSpaceInformation()
@@ -221,7 +221,7 @@ class _Contest:
         self._link: Attachment | None = None
         self._inference_s = 0.0
 
-    def _planner(self, entrant: Entrant, options: RunOptions) -> Any:
+    def _planner(self, entrant: PlannerVariant, options: RunOptions) -> Any:
         planner = compat.planner_class(entrant.planner)(self.setup.getSpaceInformation())
         if options.range is not None:
             set_range(planner, options.range)
@@ -259,7 +259,7 @@ class _Contest:
 
     def after_run(self, planner: Any, _: Any) -> None:
         """Benchmark's post-run event; what it could say of the run, OMPL 2.0 would drop."""
-        draws = {"learned": 0, "uniform": 0} if self._link is None else self._link.draws
+        draws = {"learned": 0, "uniform": 0} if self._link is None else self._link.sample_counts
         costs = self.end_run()
         self.records[planner.getName()].append(
             RunRecord(self._inference_s, draws, self._motions.checks, self._cost(), costs)
@@ -285,7 +285,7 @@ class _Contest:
 class _States(GridValidityChecker):
     """Nothing is valid any more once the guard has tripped, so that runs end at once."""
 
-    def __init__(self, si: Any, grid: GridMap, guard: Guard) -> None:
+    def __init__(self, si: Any, grid: GridMap, guard: InterruptGuard) -> None:
         super().__init__(si, grid)
         self._guard = guard
 

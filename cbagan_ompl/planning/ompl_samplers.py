@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from ..sampling.heatmap import Heatmap
-from ..sampling.sampler import DEFAULT_UNIFORM_FRACTION, DrawStream
+from ..sampling.sampler import DEFAULT_UNIFORM_FRACTION, HeatmapSampler
 from . import compat
 from .compat import ob, typed_state
-from .states import bounds_of, positions_of
+from .states import position_bounds, state_access
 
 
 class HeatmapStateSampler(ob.StateSampler):  # type: ignore[misc]
@@ -37,17 +37,17 @@ class HeatmapStateSampler(ob.StateSampler):  # type: ignore[misc]
         uniform_fraction: float = DEFAULT_UNIFORM_FRACTION,
         seed: int | np.random.Generator | None = None,
         *,
-        stream: DrawStream | None = None,
+        stream: HeatmapSampler | None = None,
     ) -> None:
         super().__init__(space)
-        self._stream = stream or DrawStream(heatmap, uniform_fraction, seed)
-        self._positions = positions_of(space, self._stream.rng)
-        self._stream.keep_inside(*bounds_of(space))
+        self._stream = stream or HeatmapSampler(heatmap, uniform_fraction, seed)
+        self._positions = state_access(space, self._stream.rng)
+        self._stream.keep_inside(*position_bounds(space))
 
     @property
-    def draws(self) -> dict[str, int]:
+    def sample_counts(self) -> dict[str, int]:
         """Draws so far: ``{"learned": n, "uniform": m}``."""
-        return self._stream.draws
+        return self._stream.sample_counts
 
     def sampleUniform(self, state: Any) -> None:  # noqa: N802
         """Draw from the heat map mixed with uniform: what planners take for "uniform"."""
@@ -90,19 +90,19 @@ class HeatmapValidStateSampler(ob.ValidStateSampler):  # type: ignore[misc]
         uniform_fraction: float = DEFAULT_UNIFORM_FRACTION,
         seed: int | np.random.Generator | None = None,
         *,
-        stream: DrawStream | None = None,
+        stream: HeatmapSampler | None = None,
     ) -> None:
         super().__init__(si)
         self._si = si
-        self._stream = stream or DrawStream(heatmap, uniform_fraction, seed)
+        self._stream = stream or HeatmapSampler(heatmap, uniform_fraction, seed)
         space = si.getStateSpace()
-        self._positions = positions_of(space, self._stream.rng)
-        self._stream.keep_inside(*bounds_of(space))
+        self._positions = state_access(space, self._stream.rng)
+        self._stream.keep_inside(*position_bounds(space))
 
     @property
-    def draws(self) -> dict[str, int]:
+    def sample_counts(self) -> dict[str, int]:
         """Draws so far: ``{"learned": n, "uniform": m}``."""
-        return self._stream.draws
+        return self._stream.sample_counts
 
     def sample(self, state: Any) -> bool:
         """Draw a valid state; False when no attempt gave one."""
@@ -127,14 +127,14 @@ def state_sampler_allocator(
     uniform_fraction: float = DEFAULT_UNIFORM_FRACTION,
     seed: int | np.random.Generator | None = None,
     *,
-    stream: DrawStream | None = None,
+    stream: HeatmapSampler | None = None,
 ) -> Any:
     """What ``StateSpace.setStateSamplerAllocator`` takes, for builds that bind it (OMPL 1.7).
 
     All samplers that it makes share one stream of draws. Arguments as for
     :class:`HeatmapStateSampler`.
     """
-    shared = stream or DrawStream(heatmap, uniform_fraction, seed)
+    shared = stream or HeatmapSampler(heatmap, uniform_fraction, seed)
 
     def allocate(space: Any) -> HeatmapStateSampler:
         return HeatmapStateSampler(space, shared.heatmap, stream=shared)
@@ -147,14 +147,14 @@ def valid_state_sampler_allocator(
     uniform_fraction: float = DEFAULT_UNIFORM_FRACTION,
     seed: int | np.random.Generator | None = None,
     *,
-    stream: DrawStream | None = None,
+    stream: HeatmapSampler | None = None,
 ) -> Any:
     """What ``SpaceInformation.setValidStateSamplerAllocator`` takes.
 
     All samplers that it makes share one stream of draws. Arguments as for
     :class:`HeatmapValidStateSampler`.
     """
-    shared = stream or DrawStream(heatmap, uniform_fraction, seed)
+    shared = stream or HeatmapSampler(heatmap, uniform_fraction, seed)
 
     def allocate(si: Any) -> HeatmapValidStateSampler:
         return HeatmapValidStateSampler(si, shared.heatmap, stream=shared)

@@ -93,7 +93,7 @@ class PlanResult:
     progress: NDArray[np.float64]
     iterations: int | None
     nodes: int
-    draws: dict[str, int]
+    sample_counts: dict[str, int]
     heatmap: Heatmap | None = field(repr=False, metadata={"json": False})
     tree: NDArray[np.float64] | None = field(repr=False, metadata={"json": False})
 
@@ -183,7 +183,7 @@ def plan(
     kind = compat.planner_class(planner)
     if sampler != "uniform":
         hook_of(planner)
-    name, provide = heatmap_provider(sampler, model, heatmap)
+    name, provide = heatmap_source(sampler, model, heatmap)
 
     with compat.log_level(ou.LOG_ERROR):
         compat.seed_ompl(used_seed)
@@ -225,7 +225,7 @@ def plan(
                 progress=run.progress,
                 iterations=run.iterations,
                 nodes=int(data.numVertices()),
-                draws=dict(link.draws) if link else {"learned": 0, "uniform": 0},
+                sample_counts=dict(link.sample_counts) if link else {"learned": 0, "uniform": 0},
                 heatmap=drawn_from,
                 tree=compat.tree_edges(data) if keep_tree else None,
             )
@@ -262,14 +262,14 @@ def _whole(name: str, value: int, least: int) -> int:
 
 
 #: Makes the heat map of a map, a start and a goal.
-Provider = Callable[[GridMap, ArrayLike, ArrayLike], Heatmap]
+HeatmapSource = Callable[[GridMap, ArrayLike, ArrayLike], Heatmap]
 
 
-def heatmap_provider(
+def heatmap_source(
     sampler: str,
     model: Predictor | str | PathLike[str] | None = None,
     heatmap: Heatmap | ArrayLike | None = None,
-) -> tuple[str, Provider | None]:
+) -> tuple[str, HeatmapSource | None]:
     """Name of the sampler, and what makes its heat map; a model is loaded here, once.
 
     Arguments as for :func:`plan`. OMPL's own sampler has no heat map.

@@ -14,7 +14,7 @@ from .compat import og
 from .validity import GridMotionValidator, GridValidityChecker
 
 #: Start and goal, as from :meth:`GridMap.check_task`.
-Ends = tuple[NDArray[np.float64], NDArray[np.float64]]
+Endpoints = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 _LEAST_THRESHOLD = float(np.finfo(np.float64).eps)
 
@@ -27,7 +27,7 @@ _NO_PARAMETERS = frozenset(
 _ROUNDING = 1e-9
 
 
-def simple_setup(grid: GridMap, task: Ends, tolerance: float) -> Any:
+def simple_setup(grid: GridMap, task: Endpoints, tolerance: float) -> Any:
     """A SimpleSetup with exact checks, start and goal, but no planner.
 
     Args:
@@ -90,7 +90,7 @@ def set_parameter(planner: Any, name: str, value: bool | float | str) -> None:
 
 
 def checked_path(
-    setup: Any, grid: GridMap, task: Ends, tolerance: float
+    setup: Any, grid: GridMap, task: Endpoints, tolerance: float
 ) -> NDArray[np.float64] | None:
     """The path that a setup has, or None when it is no path of the task after all."""
     path = compat.path_positions(setup.getSolutionPath())

@@ -12,7 +12,7 @@ from ..errors import PlannerError
 from .compat import ob
 
 
-class Positions(Protocol):
+class StateAccess(Protocol):
     """Access to the position in the states of one kind of space."""
 
     def read(self, state: Any) -> tuple[float, float]:
@@ -22,7 +22,7 @@ class Positions(Protocol):
         """Set the position of a state to a draw; anything else in the state becomes uniform."""
 
 
-class PlanePositions:
+class PlaneStateAccess:
     """States of a RealVectorStateSpace of dimension 2."""
 
     @staticmethod
@@ -37,7 +37,7 @@ class PlanePositions:
         state[1] = y
 
 
-class PosePositions:
+class PoseStateAccess:
     """States of SE2StateSpace and its Dubins and Reeds-Shepp subclasses: the heading is uniform.
 
     Args:
@@ -59,7 +59,7 @@ class PosePositions:
         state.setYaw(float(self._rng.uniform(-pi, pi)))
 
 
-def positions_of(space: Any, seed: int | np.random.Generator | None = None) -> Positions:
+def state_access(space: Any, seed: int | np.random.Generator | None = None) -> StateAccess:
     """The access that fits a state space.
 
     Args:
@@ -70,16 +70,16 @@ def positions_of(space: Any, seed: int | np.random.Generator | None = None) -> P
         PlannerError: a space whose states have no (x, y) that a 2-D map could speak about.
     """
     if isinstance(space, ob.SE2StateSpace):
-        return PosePositions(seed)
+        return PoseStateAccess(seed)
     if isinstance(space, ob.RealVectorStateSpace) and space.getDimension() == 2:
-        return PlanePositions()
+        return PlaneStateAccess()
     raise PlannerError(
         "a 2-D heat map serves RealVectorStateSpace(2), SE2StateSpace, DubinsStateSpace and "
         f"ReedsSheppStateSpace, not {type(space).__name__} of dimension {space.getDimension()}"
     )
 
 
-def bounds_of(space: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Lower and upper bounds of the positions in a space that :func:`positions_of` serves."""
+def position_bounds(space: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lower and upper bounds of the positions in a space that :func:`state_access` serves."""
     bounds = space.getBounds()
     return np.array(list(bounds.low)[:2]), np.array(list(bounds.high)[:2])

@@ -9,7 +9,7 @@ from ..errors import PlannerError
 from ..maps.collision import segment_is_free
 from ..maps.grid_map import GridMap
 from .compat import ob
-from .states import Positions, positions_of
+from .states import StateAccess, state_access
 
 _LAST_VALID_PRECISION = 1e-3
 
@@ -29,7 +29,7 @@ class GridValidityChecker(ob.StateValidityChecker):  # type: ignore[misc]
 
     def __init__(self, si: Any, grid: GridMap) -> None:
         super().__init__(si)
-        self._read = positions_of(si.getStateSpace()).read
+        self._read = state_access(si.getStateSpace()).read
         self._cells, self._width, self._height = grid.cells, grid.width, grid.height
         self._affine = tuple(grid.pixel_from_world)
 
@@ -106,11 +106,11 @@ class GridMotionValidator(ob.MotionValidator):  # type: ignore[misc]
             self._space.interpolate(s1, s2, low, last_valid.first)
 
 
-def _straight_positions(space: Any) -> Positions:
+def _straight_positions(space: Any) -> StateAccess:
     if isinstance(space, ob.DubinsStateSpace | ob.ReedsSheppStateSpace):
         raise PlannerError(
             f"GridMotionValidator checks straight motions, those of {type(space).__name__} are "
             "curves: keep OMPL's own motion validator, with a GridValidityChecker and "
             "si.setStateValidityCheckingResolution(pixel length / si.getMaximumExtent())"
         )
-    return positions_of(space)
+    return state_access(space)

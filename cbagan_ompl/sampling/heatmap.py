@@ -16,7 +16,7 @@ from ..maps.grid_map import GridMap
 from ..maps.grid_search import pull_taut, shortest_path
 
 #: A pixel whose value is at least this belongs to the promising region.
-REGION_BORDER = 0.5
+REGION_THRESHOLD = 0.5
 
 # Half widths of painted paths, as a share of the map's longer side: the corridor is where a
 # planner should look, the bridge only joins parts of a region and is kept narrow.
@@ -36,7 +36,7 @@ class Heatmap:
 
     Attributes:
         values: float32, shape (H, W), in [0, 1]; 0 on obstacles. From
-            :data:`REGION_BORDER` on, a pixel counts as part of the promising region.
+            :data:`REGION_THRESHOLD` on, a pixel counts as part of the promising region.
         grid: the map that the values lie on.
 
     Args:
@@ -131,8 +131,8 @@ class Heatmap:
 
     @property
     def region(self) -> NDArray[np.bool_]:
-        """The promising region: values from :data:`REGION_BORDER` on, shape (H, W)."""
-        return self.values >= REGION_BORDER
+        """The promising region: values from :data:`REGION_THRESHOLD` on, shape (H, W)."""
+        return self.values >= REGION_THRESHOLD
 
     @cached_property
     def parts(self) -> NDArray[np.int32]:
@@ -140,7 +140,7 @@ class Heatmap:
         parts = cv2.connectedComponents(self.region.view(np.uint8), connectivity=4)[1]
         return np.asarray(parts, np.int32)
 
-    def joins(self, start: ArrayLike, goal: ArrayLike) -> bool:
+    def connects(self, start: ArrayLike, goal: ArrayLike) -> bool:
         """Whether the region holds both ends and a 4-connected way between them.
 
         Args:
@@ -154,7 +154,7 @@ class Heatmap:
         label = int(self.parts[first[1], first[0]])
         return label > 0 and label == int(self.parts[second[1], second[0]])
 
-    def joined(self, start: ArrayLike, goal: ArrayLike) -> Heatmap:
+    def connected(self, start: ArrayLike, goal: ArrayLike) -> Heatmap:
         """This heat map with a region that joins start and goal.
 
         Where the region falls apart, its parts are joined by the cheapest path through the heat
@@ -171,7 +171,7 @@ class Heatmap:
             TaskError: see :meth:`GridMap.check_task`.
         """
         ends = self.grid.to_pixel(self.grid.check_task(start, goal))
-        if self.joins(start, goal):
+        if self.connects(start, goal):
             return self
         price = np.where(self.region, np.float32(_REGION_PRICE), 1 + _REGION_PRICE - self.values)
         pixels = shortest_path(self.grid.free, *pixel_pair(ends), price, _REPAIR_SIDE)

@@ -64,7 +64,7 @@ class InformedSet:
         return np.asarray(to_ends - (self.tolerance + np.sqrt(2) * grid.resolution))
 
 
-class DrawStream:
+class HeatmapSampler:
     """Endless draws for one planner, made in batches and handed out one by one.
 
     Each draw comes from the heat map, or with probability ``uniform_fraction`` from the uniform
@@ -115,7 +115,7 @@ class DrawStream:
         self._box = np.full(2, -inf), np.full(2, inf)
 
     @property
-    def draws(self) -> dict[str, int]:
+    def sample_counts(self) -> dict[str, int]:
         """Draws handed out so far: ``{"learned": n, "uniform": m}``."""
         return {"learned": self.learned, "uniform": self.uniform}
 
@@ -349,11 +349,11 @@ def check_draw_options(uniform_fraction: float, sharpness: float | None) -> None
     """Refuse options that no stream of draws can be made with.
 
     Args:
-        uniform_fraction: see :class:`DrawStream`.
+        uniform_fraction: see :class:`HeatmapSampler`.
         sharpness: the same, or None where the planner decides.
 
     Raises:
-        ConfigError: see :class:`DrawStream`.
+        ConfigError: see :class:`HeatmapSampler`.
     """
     _check_uniform_fraction(uniform_fraction)
     if sharpness is not None:

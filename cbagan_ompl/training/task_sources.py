@@ -12,7 +12,12 @@ from typing import Any, Protocol
 from ..common.parallel import fork_server, interrupts_held
 from ..common.validation import check_at_least, require
 from ..datasets.dataset import Dataset, Tasks
-from ..datasets.synthetic import TASKS_PER_MAP, WorldSettings, draw_world, joined_tasks
+from ..datasets.synthetic import (
+    TASKS_PER_MAP,
+    SyntheticSettings,
+    concatenate_tasks,
+    generate_map_tasks,
+)
 from ..errors import DatasetError
 
 # Numbers of the parts of an endless source; maps of different parts are different maps.
@@ -58,7 +63,7 @@ class DatasetSource:
 
 
 @dataclass(frozen=True)
-class WorldSchedule:
+class SyntheticSchedule:
     """How many worlds a run draws.
 
     Attributes:
@@ -79,10 +84,10 @@ class WorldSchedule:
             check_at_least(name, getattr(self, name), 1)
 
 
-class WorldSource:
+class SyntheticSource:
     """New tasks in every epoch, drawn by other processes while the one before is learned.
 
-    To be had from :func:`world_source`, which ends the processes.
+    To be had from :func:`synthetic_source`, which ends the processes.
 
     Args:
         settings: what kind of tasks.
@@ -91,7 +96,7 @@ class WorldSource:
     """
 
     def __init__(
-        self, settings: WorldSettings, schedule: WorldSchedule, pool: ProcessPoolExecutor
+        self, settings: SyntheticSettings, schedule: SyntheticSchedule, pool: ProcessPoolExecutor
     ) -> None:
         self._settings = settings
         self._schedule = schedule
@@ -115,7 +120,7 @@ class WorldSource:
     def _submitted(self, part: int, epoch: int, count: int) -> list[Future[Tasks]]:
         numbers = range(epoch * count, (epoch + 1) * count)
         with interrupts_held():  # submitting starts the processes
-            return [self._pool.submit(draw_world, self._settings, part, n) for n in numbers]
+            return [self._pool.submit(generate_map_tasks, self._settings, part, n) for n in numbers]
 
     def description(self) -> dict[str, Any]:
         """The settings, and how many tasks there are."""
@@ -131,7 +136,7 @@ class WorldSource:
 
 def _drawn(worlds: list[Future[Tasks]]) -> Tasks:
     """The tasks of all worlds, once they are drawn."""
-    return joined_tasks([world.result() for world in worlds])
+    return concatenate_tasks([world.result() for world in worlds])
 
 
 @contextmanager
@@ -146,7 +151,9 @@ def _deaths_told() -> Iterator[None]:
 
 
 @contextmanager
-def world_source(settings: WorldSettings, schedule: WorldSchedule) -> Iterator[WorldSource]:
+def synthetic_source(
+    settings: SyntheticSettings, schedule: SyntheticSchedule
+) -> Iterator[SyntheticSource]:
     """An endless source of tasks, and its processes until the end of the context.
 
     Args:
@@ -162,6 +169,6 @@ def world_source(settings: WorldSettings, schedule: WorldSchedule) -> Iterator[W
         context = fork_server()
     pool = ProcessPoolExecutor(schedule.jobs, context)
     try:
-        yield WorldSource(settings, schedule, pool)
+        yield SyntheticSource(settings, schedule, pool)
     finally:
         pool.shutdown(cancel_futures=True)

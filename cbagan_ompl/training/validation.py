@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from torch import nn
 
 from ..datasets.dataset import Tasks
-from ..evaluation.baselines import trivial_predictions
+from ..evaluation.baselines import trivial_baselines
 from ..evaluation.metrics import region_scores
 from ..networks.encoding import region_probability
-from ..sampling.heatmap import REGION_BORDER
+from ..sampling.heatmap import REGION_THRESHOLD
 from .batches import make_batch
 from .gan import encode
 
@@ -24,7 +24,7 @@ def evaluate(
     """Scores of a generator's regions, see :func:`cbagan_ompl.evaluation.metrics.region_scores`."""
     predicted = np.concatenate(list(_predict(generator, tasks, device, batch_size)))
     return region_scores(
-        predicted, tasks.region >= REGION_BORDER, tasks.free, tasks.start, tasks.goal
+        predicted, tasks.region >= REGION_THRESHOLD, tasks.free, tasks.start, tasks.goal
     )
 
 
@@ -38,13 +38,13 @@ def _predict(
         batch = make_batch(tasks, indices, device)
         images = encode(batch)
         image = generator(images.map, images.points, torch.zeros_like(batch.free))
-        yield (region_probability(image)[:, 0] >= REGION_BORDER).cpu().numpy()
+        yield (region_probability(image)[:, 0] >= REGION_THRESHOLD).cpu().numpy()
 
 
 def trivial_scores(tasks: Tasks) -> dict[str, dict[str, float]]:
     """Scores of two predictors that know nothing: all free space, and a straight band."""
-    truth, free = tasks.region >= REGION_BORDER, tasks.free
+    truth, free = tasks.region >= REGION_THRESHOLD, tasks.free
     return {
         name: region_scores(predicted, truth, free, tasks.start, tasks.goal)
-        for name, predicted in trivial_predictions(tasks).items()
+        for name, predicted in trivial_baselines(tasks).items()
     }

@@ -30,7 +30,12 @@ from cbagan_ompl.benchmarking.tasks import BenchmarkTask
 from cbagan_ompl.benchmarking.worker import Job
 from cbagan_ompl.cli import main
 from cbagan_ompl.planning.compat import BOOST_PYTHON
-from cbagan_ompl.planning.ompl_benchmark import Entrant, RunOptions, check_entrants, run_benchmark
+from cbagan_ompl.planning.ompl_benchmark import (
+    PlannerVariant,
+    RunOptions,
+    check_variants,
+    run_benchmark,
+)
 
 # A planner that no hook reaches.
 UNREACHED = "EITstar" if BOOST_PYTHON else "BITstar"
@@ -250,7 +255,7 @@ def test_an_interrupt_while_a_process_starts_leaves_none(
 
 
 class Aborting(BenchmarkTask):
-    """Ends the process that it is sent to."""
+    """Endpoints the process that it is sent to."""
 
     def __reduce__(self) -> Any:
         return os.abort, ()
@@ -274,7 +279,7 @@ def test_crashes_are_reported_with_their_task(two_walls: GridMap, tmp_path: Path
     assert [path.name for path in tmp_path.iterdir()] == ["two_walls_2.log"]
 
 
-# Ends the process that the task is sent to with a status that says whether torch is there.
+# Endpoints the process that the task is sent to with a status that says whether torch is there.
 TELLING = """
 from pathlib import Path
 import numpy as np
@@ -313,7 +318,7 @@ def test_every_task_needs_its_heat_map(two_walls: GridMap, tmp_path: Path) -> No
 
 def test_errors_in_events_come_out(two_walls: GridMap, corridor: Heatmap) -> None:
     task = two_walls.check_task((10, 10), (240, 240))
-    entrants = [Entrant("RRTstar", name, lambda *_: corridor) for name in ("one", "two")]
+    entrants = [PlannerVariant("RRTstar", name, lambda *_: corridor) for name in ("one", "two")]
     options = RunOptions(5, 1.0, uniform_fraction=2)
     rounds: list[int] = []
     with pytest.raises(ConfigError, match="uniform_fraction"):
@@ -324,7 +329,7 @@ def test_errors_in_events_come_out(two_walls: GridMap, corridor: Heatmap) -> Non
 @pytest.mark.usefixtures("interruptible")
 def test_interrupt_of_a_benchmark_in_this_process(two_walls: GridMap, corridor: Heatmap) -> None:
     task = two_walls.check_task((10, 10), (240, 240))
-    entrants = [Entrant("RRTstar", "corridor", lambda *_: corridor)]
+    entrants = [PlannerVariant("RRTstar", "corridor", lambda *_: corridor)]
     rounds = []
 
     def interrupt() -> None:
@@ -340,12 +345,12 @@ def test_interrupt_of_a_benchmark_in_this_process(two_walls: GridMap, corridor: 
 def test_unreached_planners_run_with_their_own_sampler_only(two_walls: GridMap) -> None:
     task = two_walls.check_task((10, 10), (240, 240))
     recording = run_benchmark(
-        "x", two_walls, task, [Entrant("RRTConnect", "uniform", None)], RunOptions(2, 1.0)
+        "x", two_walls, task, [PlannerVariant("RRTConnect", "uniform", None)], RunOptions(2, 1.0)
     )
     assert all(run.cost < np.inf for run in recording.runs["RRTConnect_uniform"])
-    entrants = [Entrant(UNREACHED, "corridor", Heatmap.corridor)]
+    entrants = [PlannerVariant(UNREACHED, "corridor", Heatmap.corridor)]
     with pytest.raises(PlannerError, match=f"no hook reaches {UNREACHED}"):
-        check_entrants(two_walls, task, entrants, RunOptions(1, 0.1))
+        check_variants(two_walls, task, entrants, RunOptions(1, 0.1))
 
 
 @pytest.mark.parametrize(

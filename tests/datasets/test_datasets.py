@@ -41,8 +41,8 @@ from cbagan_ompl.datasets.importing import described, read_set, write_dataset
 from cbagan_ompl.datasets.rrt_labels import rrt_region
 from cbagan_ompl.datasets.splits import is_test_task
 from cbagan_ompl.evaluation.label_noise import label_noise
-from cbagan_ompl.evaluation.metrics import joins
-from cbagan_ompl.map_generators import FAMILIES, MIN_SIDE
+from cbagan_ompl.evaluation.metrics import connects
+from cbagan_ompl.map_generators import MAP_GENERATORS, MIN_SIDE
 from cbagan_ompl.maps.grid_map import GridMap
 
 SMALL = GenerationSettings(maps=6, tasks=3, copies=2, runs=3, families=("blocks", "triangles"))
@@ -91,12 +91,12 @@ def test_an_interrupted_run_goes_on_to_the_same_files(folder: Path, tmp_path: Pa
 
 @pytest.mark.parametrize("size", [MIN_SIDE, 64])
 def test_sets_of_all_families(tmp_path: Path, size: int) -> None:
-    settings = GenerationSettings(maps=len(FAMILIES), tasks=1, size=size, runs=1)
-    assert settings.families == tuple(FAMILIES)
+    settings = GenerationSettings(maps=len(MAP_GENERATORS), tasks=1, size=size, runs=1)
+    assert settings.families == tuple(MAP_GENERATORS)
     generate(tmp_path / "set", settings, jobs=1, resume=False, progress=False)
     made = load_dataset(tmp_path / "set")
-    assert len(made.train) + len(made.test) == len(FAMILIES)
-    assert len(np.unique(made.train.maps, axis=0)) == len(FAMILIES)
+    assert len(made.train) + len(made.test) == len(MAP_GENERATORS)
+    assert len(np.unique(made.train.maps, axis=0)) == len(MAP_GENERATORS)
 
 
 def test_another_seed_gives_other_maps_tasks_and_labels(dataset: Dataset, tmp_path: Path) -> None:
@@ -113,7 +113,7 @@ def test_labels_hold_the_ends_and_lie_in_free_space(dataset: Dataset) -> None:
             start, goal = (tuple(end[i].astype(int).tolist()) for end in (tasks.start, tasks.goal))
             assert not (region & ~tasks.free[i]).any()
             assert region[start[1], start[0]]
-            assert joins(region, start, goal)
+            assert connects(region, start, goal)
             assert np.hypot(*(tasks.start[i] - tasks.goal[i])) >= 0.25 * 64
 
 

@@ -27,18 +27,18 @@ from cbagan_ompl.datasets.synthetic import (
     HARD_DETOUR,
     SLACK,
     TASKS_PER_MAP,
-    WorldSettings,
+    SyntheticSettings,
+    concatenate_tasks,
     detour_heat,
-    draw_world,
-    joined_tasks,
+    generate_map_tasks,
 )
-from cbagan_ompl.evaluation.metrics import joins
+from cbagan_ompl.evaluation.metrics import connects
 from cbagan_ompl.maps.grid_map import GridMap
-from cbagan_ompl.sampling.heatmap import REGION_BORDER
-from cbagan_ompl.training.task_sources import WorldSchedule, WorldSource, world_source
+from cbagan_ompl.sampling.heatmap import REGION_THRESHOLD
+from cbagan_ompl.training.task_sources import SyntheticSchedule, SyntheticSource, synthetic_source
 
-SMALL = WorldSettings(size=64, seed=3)
-FEW = WorldSchedule(maps=2, held_back=1)
+SMALL = SyntheticSettings(size=64, seed=3)
+FEW = SyntheticSchedule(maps=2, held_back=1)
 
 
 def equal(one: Tasks, other: Tasks) -> bool:
@@ -127,34 +127,34 @@ def test_heat_joins_the_ends_through_free_space() -> None:
     assert heat.max() <= 1
     assert heat[20, 20] == pytest.approx(1, abs=0.02)
     assert (heat[~free] == 0).all()
-    assert joins(heat >= REGION_BORDER, (20, 20), (80, 20))
+    assert connects(heat >= REGION_THRESHOLD, (20, 20), (80, 20))
     assert heat[70, 99] < 0.01
 
 
 def test_heat_keeps_both_of_two_ways_that_are_equally_long() -> None:
     free = np.ones((61, 100), np.bool_)
     free[20:41, 30:70] = False
-    region = heat_of(free, (10, 30), (90, 30)) >= REGION_BORDER
+    region = heat_of(free, (10, 30), (90, 30)) >= REGION_THRESHOLD
     for half in (slice(0, 31), slice(31, 61)):
         one = region.copy()
         one[half, 30:70] = False
-        assert joins(one, (10, 30), (90, 30))
+        assert connects(one, (10, 30), (90, 30))
 
 
 # --- worlds ---------------------------------------------------------------------------------------
 
 
 def test_a_world_depends_on_seed_part_and_number_alone() -> None:
-    world = draw_world(SMALL, 0, 5)
-    assert equal(world, draw_world(SMALL, 0, 5))
+    world = generate_map_tasks(SMALL, 0, 5)
+    assert equal(world, generate_map_tasks(SMALL, 0, 5))
     others = [(SMALL, 1, 5), (SMALL, 0, 6), (replace(SMALL, seed=4), 0, 5)]
     for settings, part, number in others:
-        assert not np.array_equal(world.maps, draw_world(settings, part, number).maps)
+        assert not np.array_equal(world.maps, generate_map_tasks(settings, part, number).maps)
 
 
 @pytest.mark.parametrize("number", range(6))
 def test_worlds_have_tasks_that_can_be_solved(number: int) -> None:
-    world = draw_world(SMALL, 0, number)
+    world = generate_map_tasks(SMALL, 0, number)
     assert len(world) == TASKS_PER_MAP
     assert world.maps.shape == (1, 64, 64)
     assert world.region.shape == (TASKS_PER_MAP, 64, 64)
@@ -166,19 +166,19 @@ def test_worlds_have_tasks_that_can_be_solved(number: int) -> None:
         assert all(free[v, u] for u, v in ends)
         grid.check_task(start, goal)
         assert np.hypot(*(start - goal)) >= 0.2 * 64
-        assert joins(heat >= REGION_BORDER, *ends)
+        assert connects(heat >= REGION_THRESHOLD, *ends)
         assert (heat[~free] == 0).all()
 
 
 def test_worlds_of_the_smallest_size() -> None:
     for number in range(8):
-        assert draw_world(WorldSettings(size=48), 0, number).side == 48
+        assert generate_map_tasks(SyntheticSettings(size=48), 0, number).side == 48
 
 
-def hard_share(settings: WorldSettings, maps: int) -> float:
+def hard_share(settings: SyntheticSettings, maps: int) -> float:
     shares = []
     for number in range(maps):
-        world = draw_world(settings, 0, number)
+        world = generate_map_tasks(settings, 0, number)
         for start, goal in zip(world.start.astype(int), world.goal.astype(int), strict=True):
             field = distances(world.maps[0].astype(bool), (start[0], start[1]))
             straight = np.hypot(*(start - goal))
@@ -187,7 +187,7 @@ def hard_share(settings: WorldSettings, maps: int) -> float:
 
 
 def test_as_many_tasks_are_hard_as_were_asked_for() -> None:
-    mazes = WorldSettings(size=64, families=("cell_maze",))
+    mazes = SyntheticSettings(size=64, families=("cell_maze",))
     shares = [hard_share(replace(mazes, hard_share=share), 40) for share in (0.2, 0.65, 1.0)]
     assert shares[1] == pytest.approx(0.65, abs=0.1)
     # Some of the mazes have too few tasks of a kind.
@@ -213,28 +213,28 @@ def test_worlds_that_make_no_sense(option: str, value: Any, message: str) -> Non
 @pytest.mark.parametrize("option", ["maps", "held_back", "jobs"])
 def test_schedules_that_make_no_sense(option: str) -> None:
     with pytest.raises(ConfigError, match=f"{option} must be at least 1"):
-        WorldSchedule(**{option: 0})
+        SyntheticSchedule(**{option: 0})
 
 
 # --- the source -----------------------------------------------------------------------------------
 
 
 @contextmanager
-def threaded(settings: WorldSettings = SMALL) -> Iterator[WorldSource]:
+def threaded(settings: SyntheticSettings = SMALL) -> Iterator[SyntheticSource]:
     """A source whose worlds are drawn by a thread, which starts faster than a process."""
     with ThreadPoolExecutor(1) as pool:
-        yield WorldSource(settings, FEW, pool)  # type: ignore[arg-type]
+        yield SyntheticSource(settings, FEW, pool)  # type: ignore[arg-type]
 
 
 def test_processes_draw_what_the_seed_says() -> None:
-    with world_source(SMALL, FEW) as source:
+    with synthetic_source(SMALL, FEW) as source:
         drawn = source.epoch(0), source.validation, source.test
         assert source.side == 64
         assert source.description()["train_tasks"] == len(drawn[0]) == 2 * TASKS_PER_MAP
-    expected = joined_tasks([draw_world(SMALL, 0, n) for n in (0, 1)])
+    expected = concatenate_tasks([generate_map_tasks(SMALL, 0, n) for n in (0, 1)])
     assert equal(drawn[0], expected)
-    assert equal(drawn[1], draw_world(SMALL, 1, 0))
-    assert equal(drawn[2], draw_world(SMALL, 2, 0))
+    assert equal(drawn[1], generate_map_tasks(SMALL, 1, 0))
+    assert equal(drawn[2], generate_map_tasks(SMALL, 2, 0))
 
 
 def test_every_epoch_has_new_tasks_and_the_same_ones_again() -> None:
@@ -264,7 +264,7 @@ def test_worlds_need_numba(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "numba", None)
     with (
         pytest.raises(MissingDependencyError, match=r"numba.*pip install 'cbagan-ompl\[train\]'"),
-        world_source(SMALL, FEW),
+        synthetic_source(SMALL, FEW),
     ):
         pass
 
@@ -388,8 +388,8 @@ def test_bad_options_are_told_before_anything_is_drawn(
 
 
 def test_a_drawing_process_that_dies_gives_a_clear_error() -> None:
-    settings = WorldSettings(size=64, families=("blocks",))
-    with world_source(settings, WorldSchedule(maps=2, held_back=1)) as source:
+    settings = SyntheticSettings(size=64, families=("blocks",))
+    with synthetic_source(settings, SyntheticSchedule(maps=2, held_back=1)) as source:
         for child in active_children():
             child.kill()
         with pytest.raises(DatasetError, match="drew worlds has died"):

@@ -12,11 +12,11 @@ from scipy.linalg import sqrtm
 
 from cbagan_ompl import ConfigError, DatasetError
 from cbagan_ompl.datasets.dataset import Dataset, Tasks, load_dataset
-from cbagan_ompl.evaluation.baselines import stored_predictions, trivial_predictions
+from cbagan_ompl.evaluation.baselines import stored_predictions, trivial_baselines
 from cbagan_ompl.evaluation.bootstrap import RESAMPLES, interval, resampled_weights
 from cbagan_ompl.evaluation.evaluator import Evaluator
 from cbagan_ompl.evaluation.frechet import frechet_distance, region_features
-from cbagan_ompl.evaluation.metrics import joins, task_scores
+from cbagan_ompl.evaluation.metrics import connects, task_scores
 
 
 @pytest.fixture(scope="module")
@@ -49,8 +49,8 @@ def test_the_truth_scores_one_and_the_background_nothing(dataset: Dataset) -> No
 
 def test_8_and_4_connected() -> None:
     diagonal = np.eye(3, dtype=np.bool_)
-    assert joins(diagonal, (0, 0), (2, 2), 8)
-    assert not joins(diagonal, (0, 0), (2, 2), 4)
+    assert connects(diagonal, (0, 0), (2, 2), 8)
+    assert not connects(diagonal, (0, 0), (2, 2), 4)
     ends = np.array([[0.5, 0.5]]), np.array([[2.5, 2.5]])
     tasks = task_scores(diagonal[None], diagonal[None], np.ones((1, 3, 3), bool), *ends)
     assert (tasks.joined.tolist(), tasks.joined_4.tolist()) == ([True], [False])
@@ -59,7 +59,7 @@ def test_8_and_4_connected() -> None:
 
 def test_weights_count_tasks(dataset: Dataset) -> None:
     tasks = dataset.test
-    predicted = trivial_predictions(tasks)["straight line"]
+    predicted = trivial_baselines(tasks)["straight line"]
     scored = evaluator(tasks).evaluate("line", predicted).tasks
     weights = np.zeros(len(tasks))
     weights[[0, 2]] = 2, 1

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cbagan_ompl.evaluation.metrics import confusion, joins, region_scores
+from cbagan_ompl.evaluation.metrics import confusion, connects, region_scores
 
 
 def mask(*rows: str) -> NDArray[np.bool_]:
@@ -39,12 +39,12 @@ def test_an_empty_prediction_scores_zero(truth: NDArray[np.bool_]) -> None:
 
 def test_joins_is_8_connected() -> None:
     diagonal = mask("#..", ".#.", "..#")
-    assert joins(diagonal, (0, 0), (2, 2))
-    assert not joins(mask("#..", "...", "..#"), (0, 0), (2, 2))
+    assert connects(diagonal, (0, 0), (2, 2))
+    assert not connects(mask("#..", "...", "..#"), (0, 0), (2, 2))
 
 
 def test_start_and_goal_count_as_region() -> None:
-    assert joins(mask("...", ".#.", "..."), (0, 0), (2, 2))
+    assert connects(mask("...", ".#.", "..."), (0, 0), (2, 2))
 
 
 def test_connectivity_stops_at_obstacles() -> None:

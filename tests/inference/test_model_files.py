@@ -295,7 +295,7 @@ def test_any_size(predictor: Predictor, shape: tuple[int, int]) -> None:
     assert heatmap.values.shape == shape
     assert (heatmap.values[free] > 0).all()
     assert (heatmap.values[~free] == 0).all()
-    assert predictor.predict(grid, *ends).joins(*ends)
+    assert predictor.predict(grid, *ends).connects(*ends)
 
 
 def test_predictions_repeat_and_leave_the_threads_alone(predictor: Predictor) -> None:

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from cbagan_ompl.errors import ConfigError
-from cbagan_ompl.map_generators import FAMILIES, MIN_SIDE, bug_trap, narrow_passage
-from cbagan_ompl.map_generators.randomization import world_map
+from cbagan_ompl.map_generators import MAP_GENERATORS, MIN_SIDE, bug_trap, narrow_passage
+from cbagan_ompl.map_generators.randomization import randomized_map
 from cbagan_ompl.maps.grid_map import GridMap
 from cbagan_ompl.maps.loading import bundled_folder, bundled_maps
 
@@ -38,13 +38,13 @@ SHARES = {
     "room_grid": (0.6, 0.98),
     "shelves": (0.35, 0.99),
 }
-FOLLOWING = sorted(set(FAMILIES) - set(SHARES))
+FOLLOWING = sorted(set(MAP_GENERATORS) - set(SHARES))
 SIZES = [(MIN_SIDE, MIN_SIDE), (64, 150), (220, 96)]
 
 
 def checked(family, seed, width, height):
     """A map that has the right shape, and whose free pixels are all connected."""
-    free = FAMILIES[family](np.random.default_rng(seed), width, height)
+    free = MAP_GENERATORS[family](np.random.default_rng(seed), width, height)
     assert free.shape == (height, width)
     assert free.dtype == np.bool_
     assert GridMap(free).components.max() == 1
@@ -52,7 +52,7 @@ def checked(family, seed, width, height):
 
 
 def test_every_family_is_tested_for_its_free_share():
-    assert set(SHARES) < set(FAMILIES)
+    assert set(SHARES) < set(MAP_GENERATORS)
     assert len(FOLLOWING) == 11
 
 
@@ -68,7 +68,7 @@ def test_families_of_every_scale(family, width, height):
 def test_no_map_is_all_free(family):
     # Of so many small maps some would have room for neither walls nor shelves.
     for seed in range(200):
-        free = FAMILIES[family](np.random.default_rng(seed), MIN_SIDE, MIN_SIDE)
+        free = MAP_GENERATORS[family](np.random.default_rng(seed), MIN_SIDE, MIN_SIDE)
         assert 0.35 < free.mean() < 0.995
 
 
@@ -83,9 +83,9 @@ def test_families_at_every_size(family, width, height):
             assert part.mean() > 0.25
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", MAP_GENERATORS)
 def test_families_are_random_and_reproducible(family):
-    draw = FAMILIES[family]
+    draw = MAP_GENERATORS[family]
     first = draw(np.random.default_rng(1), 96, 96)
     np.testing.assert_array_equal(first, draw(np.random.default_rng(1), 96, 96))
     assert (first != draw(np.random.default_rng(2), 96, 96)).any()
@@ -95,20 +95,20 @@ def test_families_are_random_and_reproducible(family):
 def test_world_maps(side):
     seen = set()
     for seed in range(40):
-        free = world_map(np.random.default_rng(seed), side, tuple(FAMILIES))
+        free = randomized_map(np.random.default_rng(seed), side, tuple(MAP_GENERATORS))
         assert free.shape == (side, side)
         assert free.dtype == np.bool_
         assert 0.12 <= free.mean() < 1
         assert GridMap(free).components.max() == 1
         seen.add(free.tobytes())
-        again = world_map(np.random.default_rng(seed), side, tuple(FAMILIES))
+        again = randomized_map(np.random.default_rng(seed), side, tuple(MAP_GENERATORS))
         np.testing.assert_array_equal(free, again)
     assert len(seen) == 40
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", MAP_GENERATORS)
 def test_world_maps_of_one_family(family):
-    free = world_map(np.random.default_rng(0), 64, (family,))
+    free = randomized_map(np.random.default_rng(0), 64, (family,))
     assert free.shape == (64, 64)
 
 
@@ -139,14 +139,14 @@ def test_bug_trap_is_left_by_its_mouth_only(seed):
     assert any(shuts_the_trap(column) for column in range(50, 110))
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", MAP_GENERATORS)
 def test_families_refuse_small_maps(family):
     with pytest.raises(ConfigError, match=f"from {MIN_SIDE} pixels a side up, got 40 x 100"):
-        FAMILIES[family](np.random.default_rng(0), 40, 100)
+        MAP_GENERATORS[family](np.random.default_rng(0), 40, 100)
 
 
 def test_bundled_maps_are_what_the_script_draws(script):
-    assert set(bundled_maps()) == set(script.TASKS) < set(FAMILIES)
+    assert set(bundled_maps()) == set(script.TASKS) < set(MAP_GENERATORS)
     for name in bundled_maps():
         np.testing.assert_array_equal(GridMap.load(f"bundled:{name}").free, script.draw(name))
     shipped = (bundled_folder() / "tasks.csv").read_text(encoding="utf-8")

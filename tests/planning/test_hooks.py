@@ -96,10 +96,10 @@ def test_planner_draws_from_the_heatmap(
     with attach(setup, corridor, seed=1) as link:
         assert link.hook == reached_planners()[planner]
         status = setup.solve(0.4)
-        assert link.draws["learned"] > 20
+        assert link.sample_counts["learned"] > 20
         # STRIDE draws around its nodes, half of which lie where the heat map is 0.
         least = 0.5 if planner == "STRIDE" else 1.0
-        assert link.draws["learned"] > least * link.draws["uniform"]
+        assert link.sample_counts["learned"] > least * link.sample_counts["uniform"]
         if compat.is_exact(status):
             path = compat.path_positions(setup.getSolutionPath())
             assert two_walls.path_is_free(path)
@@ -113,11 +113,11 @@ def test_nearly_all_samples_are_ours(two_walls: GridMap, corridor: Heatmap, plan
     with attach(setup, corridor, 0.1, seed=2, adaptation=NO_ADAPTATION) as link:
         condition, iterations = until(lambda: False, limit=1500)
         setup.solve(condition)
-        share = sum(link.draws.values()) / iterations[0]
+        share = sum(link.sample_counts.values()) / iterations[0]
         assert share >= 0.8
         if link.hook == "goal-injection":
             assert share <= 1
-        assert 0.85 < link.draws["learned"] / sum(link.draws.values()) < 0.95
+        assert 0.85 < link.sample_counts["learned"] / sum(link.sample_counts.values()) < 0.95
 
 
 def has_solution(planner: Any) -> bool:
@@ -135,7 +135,7 @@ def first_solutions(grid: GridMap, planner: str, heatmap: Heatmap | None) -> np.
         assert compat.is_exact(setup.solve(condition))
         iterations.append(count[0])
         if link is not None:
-            assert link.draws["learned"] == 0
+            assert link.sample_counts["learned"] == 0
             link.detach()
     return np.array(iterations)
 
@@ -182,9 +182,9 @@ def test_simplified_path_still_ends_in_the_goal(
         setup = make_setup(two_walls, planner)
         with attach(setup, corridor, seed=seed) as link:
             setup.solve(until(lambda: False, limit=1500)[0])
-            draws = link.draws
+            draws = link.sample_counts
             setup.simplifySolution()
-            assert link.draws == draws, "the simplifier asks the goal, not the heat map"
+            assert link.sample_counts == draws, "the simplifier asks the goal, not the heat map"
             assert np.hypot(*(path_end(setup) - GOAL)) <= 2.0
 
 
@@ -203,19 +203,19 @@ def test_solve_again_and_detach(two_walls: GridMap, corridor: Heatmap, planner: 
     for _ in range(3):
         setup.clear()
         setup.solve(0.15)
-        assert link.draws["learned"] > seen, "each run draws"
-        seen = link.draws["learned"]
+        assert link.sample_counts["learned"] > seen, "each run draws"
+        seen = link.sample_counts["learned"]
     if planner == "InformedRRTstar":
         setup.solve(0.1)
-        assert link.draws["learned"] > seen, "a run that goes on draws"
+        assert link.sample_counts["learned"] > seen, "a run that goes on draws"
     link.detach()
     link.detach()
-    seen = link.draws["learned"]
+    seen = link.sample_counts["learned"]
     assert [getter() for getter in settings] == before
     assert setup.getGoal().getThreshold() == 2.0
     setup.clear()
     assert setup.solve(0.5)
-    assert link.draws["learned"] == seen, "after detach the planner is plain OMPL's"
+    assert link.sample_counts["learned"] == seen, "after detach the planner is plain OMPL's"
     assert np.hypot(*(path_end(setup) - GOAL)) <= 2.0
 
 
@@ -232,8 +232,8 @@ def test_poses(two_walls: GridMap, corridor: Heatmap, kind: str, planner: str) -
     with attach(setup, corridor, seed=0) as link:
         setup.solve(0.4)
         # PRM ends with its first path, after a few dozen draws.
-        assert link.draws["learned"] > (10 if planner == "PRM" else 50)
-        assert link.draws["learned"] > link.draws["uniform"]
+        assert link.sample_counts["learned"] > (10 if planner == "PRM" else 50)
+        assert link.sample_counts["learned"] > link.sample_counts["uniform"]
         path = setup.getSolutionPath()
         yaws = [path.getState(i).getYaw() for i in range(path.getStateCount())]
         assert path.getStateCount() < 3 or np.std(yaws) > 0.01
@@ -293,7 +293,7 @@ def test_subclass_of_a_planner_is_known_by_its_base(two_walls: GridMap, corridor
     setup.setPlanner(instance)
     with attach(setup, corridor, seed=0) as link:
         setup.solve(0.2)
-        assert link.draws["learned"] > 20
+        assert link.sample_counts["learned"] > 20
 
 
 @pytest.mark.parametrize("planner", ["RRT", "RRTstar"])
@@ -325,10 +325,10 @@ def test_planners_that_keep_their_sampler_are_reached_when_set_up(
     setup.setup()
     with attach(setup, corridor, seed=0) as link:
         setup.solve(0.1)
-        seen = link.draws
+        seen = link.sample_counts
         assert seen["learned"] > 20
     setup.solve(0.1)
-    assert link.draws == seen, "after detach the planner is plain OMPL's"
+    assert link.sample_counts == seen, "after detach the planner is plain OMPL's"
 
 
 @pytest.mark.parametrize("planner", ["RRT", "RRTstar", "InformedRRTstar", "PRM"])
@@ -338,7 +338,7 @@ def test_attach_after_a_solve(two_walls: GridMap, corridor: Heatmap, planner: st
     setup.solve(0.1)
     with attach(setup, corridor, seed=0) as link:
         setup.solve(0.2)
-        assert link.draws["learned"] > 20
+        assert link.sample_counts["learned"] > 20
 
 
 def test_attach_with_informed_sampling_of_rrtstar(two_walls: GridMap, corridor: Heatmap) -> None:
@@ -346,7 +346,7 @@ def test_attach_with_informed_sampling_of_rrtstar(two_walls: GridMap, corridor: 
     setup.getPlanner().setInformedSampling(True)
     with attach(setup, corridor, seed=0) as link:
         setup.solve(0.2)
-        assert link.draws["learned"] > 20
+        assert link.sample_counts["learned"] > 20
     assert setup.getPlanner().getInformedSampling()
 
 
@@ -363,10 +363,10 @@ def test_planner_cleared_alone_draws_again(two_walls: GridMap, corridor: Heatmap
     setup = make_setup(two_walls, "RRT")
     with attach(setup, corridor, seed=0) as link:
         setup.solve(0.5)
-        seen = link.draws["learned"]
+        seen = link.sample_counts["learned"]
         setup.getPlanner().clear()
         assert compat.is_exact(setup.solve(2.0))
-        assert link.draws["learned"] > seen
+        assert link.sample_counts["learned"] > seen
 
 
 @pytest.mark.parametrize("planner", ["RRT", "InformedRRTstar"])
@@ -413,6 +413,6 @@ def test_several_starts_and_goals(two_walls: GridMap, corridor: Heatmap) -> None
     setup.setGoal(goals)
     with attach(setup, corridor, seed=0) as link:
         assert compat.is_exact(setup.solve(0.5))
-        assert link.draws["learned"] > 100
+        assert link.sample_counts["learned"] > 100
         end = path_end(setup)
         assert min(np.hypot(*(end - (x, 240))) for x in (200, 240)) <= 2

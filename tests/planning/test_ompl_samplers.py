@@ -58,7 +58,7 @@ def test_all_three_methods(corridor: Heatmap, sampler: Any) -> None:
         assert max(abs(state[0] - 20), abs(state[1] - 20)) <= 20
     sampler.sampleUniformNear(state, Fake(0, 0), 1e-6)
     assert min(state.values) >= 0, "draws stay in the bounds of the space"
-    assert sum(sampler.draws.values()) == 701
+    assert sum(sampler.sample_counts.values()) == 701
 
 
 def test_same_seed_same_draws(two_walls: GridMap, corridor: Heatmap) -> None:
@@ -100,7 +100,7 @@ def test_valid_state_sampler_by_hand(two_walls: GridMap, corridor: Heatmap) -> N
     si.setValidStateSamplerAllocator(compat.valid_state_sampler_allocator(allocate))
     setup.setPlanner(og.PRM(si))
     assert compat.is_exact(setup.solve(2.0))
-    assert made[0].draws["learned"] > 10
+    assert made[0].sample_counts["learned"] > 10
     compat.clear_valid_state_sampler(si)
 
 

@@ -43,7 +43,7 @@ def test_samplers_and_planners(two_walls: GridMap, planner: str, sampler: str) -
     check(result, two_walls)
     assert result.sampler == sampler
     assert (result.hook is None) == (sampler == "uniform")
-    assert (result.draws["learned"] > 0) == (sampler != "uniform")
+    assert (result.sample_counts["learned"] > 0) == (sampler != "uniform")
     assert (result.inference_s > 0) == (sampler != "uniform")
     assert result.first_solution_s is not None
     assert 0 < result.first_solution_s <= result.planning_s
@@ -137,7 +137,7 @@ def test_own_heatmap(two_walls: GridMap, corridor: Heatmap) -> None:
     result = plan(two_walls, START, GOAL, "RRT", time=5, range=20, heatmap=corridor, seed=0)
     check(result, two_walls)
     assert result.sampler == "heatmap"
-    assert result.draws["learned"] > result.draws["uniform"]
+    assert result.sample_counts["learned"] > result.sample_counts["uniform"]
 
 
 def test_unsolved_is_said(two_walls: GridMap) -> None:
@@ -159,7 +159,7 @@ def test_json_fields(two_walls: GridMap) -> None:
         "inference_s", "planning_s", "total_s", "nodes", "draws", "first_solution_s",
     }  # fmt: skip
     assert not {"tree", "heatmap"} & set(values)
-    assert set(values["draws"]) == {"learned", "uniform"}
+    assert set(values["sample_counts"]) == {"learned", "uniform"}
     assert values["ompl_version"] == compat.ompl_version()
     assert result.tree is not None
     assert result.tree.shape == (result.nodes - 1, 2, 2)

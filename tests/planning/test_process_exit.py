@@ -13,7 +13,7 @@ free = np.ones((40, 40), bool)
 free[20, :30] = False
 grid = cbagan_ompl.GridMap(free)
 result = cbagan_ompl.plan(grid, (5, 5), (5, 35), {planner!r}, "corridor", time=0.2)
-assert result.draws["learned"] > 0
+assert result.sample_counts["learned"] > 0
 print("done")
 """
 
@@ -36,7 +36,7 @@ planner = og.{planner}(si)
 setup.setPlanner(planner)
 link = cbagan_ompl.attach(setup, heatmap)
 setup.solve(0.2)
-assert link.draws["learned"] > 0
+assert link.sample_counts["learned"] > 0
 print("done")
 """
 

@@ -10,7 +10,7 @@ from helpers.tasks import GOAL, START
 
 from cbagan_ompl import ConfigError, GridMap, Heatmap, plan
 from cbagan_ompl.sampling.adaptation import FULL_ADAPTATION, NO_ADAPTATION, Adaptation, Tree, Trust
-from cbagan_ompl.sampling.sampler import DrawStream
+from cbagan_ompl.sampling.sampler import HeatmapSampler
 
 
 def make_trust(
@@ -22,8 +22,8 @@ def make_trust(
     return trust, shares
 
 
-def adapted(heatmap: Heatmap, trust: Trust) -> DrawStream:
-    stream = DrawStream(heatmap, 0.1, seed=0)
+def adapted(heatmap: Heatmap, trust: Trust) -> HeatmapSampler:
+    stream = HeatmapSampler(heatmap, 0.1, seed=0)
     stream.adapt(trust)
     return stream
 
@@ -201,6 +201,6 @@ def test_the_simplifier_gets_the_true_goal_where_few_draws_are_ours(planner: str
 
 
 def test_points_outside_are_not_joined(corridor: Heatmap) -> None:
-    assert corridor.joins(START, GOAL)
-    assert not corridor.joins(START, (256.0, 5.0))
-    assert not corridor.joins(START, (-3.0, 5.0))
+    assert corridor.connects(START, GOAL)
+    assert not corridor.connects(START, (256.0, 5.0))
+    assert not corridor.connects(START, (-3.0, 5.0))

@@ -90,10 +90,10 @@ def test_controls_know_the_task(two_walls: GridMap) -> None:
     line = Heatmap.straight_line(two_walls, START, GOAL)
     assert line.values[125, 125] > 0.9
     assert line.values[40, 200] == 0
-    assert not line.joins(START, GOAL)
+    assert not line.connects(START, GOAL)
 
     corridor = Heatmap.corridor(two_walls, START, GOAL)
-    assert corridor.joins(START, GOAL)
+    assert corridor.connects(START, GOAL)
     assert corridor.values[66, 203] > 0.5, "through the first gap"
     assert corridor.values[155, 45] > 0.5, "through the second gap"
     assert corridor.values[125, 220] == 0
@@ -105,13 +105,13 @@ def test_joined_bridges_a_broken_region(two_walls: GridMap, corridor: Heatmap) -
     values[60:120] = 0
     values[:20] = 0
     broken = Heatmap(values, two_walls)
-    assert not broken.joins(START, GOAL)
-    joined = broken.joined(START, GOAL)
-    assert joined.joins(START, GOAL)
+    assert not broken.connects(START, GOAL)
+    joined = broken.connected(START, GOAL)
+    assert joined.connects(START, GOAL)
     assert (joined.values >= broken.values).all()
     added = joined.region & ~broken.region
     assert 0 < added.sum() < 0.1 * two_walls.free.sum()
-    assert joined.joined(START, GOAL) is joined
+    assert joined.connected(START, GOAL) is joined
 
 
 def test_joined_refuses_separate_parts() -> None:
@@ -119,7 +119,7 @@ def test_joined_refuses_separate_parts() -> None:
     free[:, 4] = False
     grid = GridMap(free)
     with pytest.raises(TaskError, match="no path joins"):
-        Heatmap.uniform(grid).joined((1, 1), (8, 8))
+        Heatmap.uniform(grid).connected((1, 1), (8, 8))
 
 
 def test_load(tmp_path: Path, two_walls: GridMap, corridor: Heatmap) -> None:

@@ -7,18 +7,18 @@ import pytest
 from helpers.tasks import GOAL, START
 
 from cbagan_ompl import ConfigError, GridMap, Heatmap
-from cbagan_ompl.sampling.sampler import DrawStream, InformedSet
+from cbagan_ompl.sampling.sampler import HeatmapSampler, InformedSet
 
 
-def take(stream: DrawStream, n: int) -> np.ndarray:
+def take(stream: HeatmapSampler, n: int) -> np.ndarray:
     return np.array([stream.next() for _ in range(n)])
 
 
 def test_mixture_and_counts(two_walls: GridMap, corridor: Heatmap) -> None:
-    stream = DrawStream(corridor, 0.3, seed=0)
+    stream = HeatmapSampler(corridor, 0.3, seed=0)
     points = take(stream, 20_000)
-    assert sum(stream.draws.values()) == len(points)
-    assert abs(stream.draws["uniform"] / len(points) - 0.3) < 0.02
+    assert sum(stream.sample_counts.values()) == len(points)
+    assert abs(stream.sample_counts["uniform"] / len(points) - 0.3) < 0.02
     assert two_walls.is_free(points).all()
     columns, rows = points.astype(int).T
     off_corridor = (corridor.values[rows, columns] == 0).mean()
@@ -27,7 +27,7 @@ def test_mixture_and_counts(two_walls: GridMap, corridor: Heatmap) -> None:
 
 
 def test_same_seed_same_draws(corridor: Heatmap) -> None:
-    first, again = DrawStream(corridor, seed=3), DrawStream(corridor, seed=3)
+    first, again = HeatmapSampler(corridor, seed=3), HeatmapSampler(corridor, seed=3)
     np.testing.assert_array_equal(take(first, 3000), take(again, 3000))
     np.testing.assert_array_equal(
         [first.near(50, 50, 20), first.gaussian(50, 50, 5)],
@@ -38,7 +38,7 @@ def test_same_seed_same_draws(corridor: Heatmap) -> None:
 @pytest.mark.parametrize("fraction", [0, -0.1, 1.01, float("nan")])
 def test_bad_uniform_fraction(corridor: Heatmap, fraction: float) -> None:
     with pytest.raises(ConfigError, match="uniform_fraction"):
-        DrawStream(corridor, fraction)
+        HeatmapSampler(corridor, fraction)
 
 
 @pytest.mark.parametrize("sharpness", [0, -1, float("nan"), inf, "sharp", None])
@@ -46,7 +46,7 @@ def test_bad_sharpness(corridor: Heatmap, sharpness: float) -> None:
     with pytest.raises(
         ConfigError, match=f"sharpness is a finite number above 0, got {sharpness!r}"
     ):
-        DrawStream(corridor, sharpness=sharpness)
+        HeatmapSampler(corridor, sharpness=sharpness)
 
 
 @pytest.mark.parametrize(("sharpness", "dim_share"), [(0.5, 1 / 3), (1, 1 / 5), (3, 1 / 65)])
@@ -55,14 +55,14 @@ def test_draws_follow_a_power_of_the_heat_map(sharpness: float, dim_share: float
     grid = GridMap(np.ones((40, 40), bool))
     values = np.full(grid.shape, 4e-10)
     values[:, :20] = 1e-10
-    stream = DrawStream(Heatmap(values, grid), 1e-9, seed=0, sharpness=sharpness)
+    stream = HeatmapSampler(Heatmap(values, grid), 1e-9, seed=0, sharpness=sharpness)
     assert abs((take(stream, 20_000)[:, 0] < 20).mean() - dim_share) < 0.01
     near = np.array([stream.near(20, 20, 10) for _ in range(3000)])
     assert abs((near[:, 0] < 20).mean() - dim_share) < 0.05
 
 
 def test_draws_stay_in_the_box_where_nothing_shortens_the_path(corridor: Heatmap) -> None:
-    stream = DrawStream(corridor, 0.5, seed=0)
+    stream = HeatmapSampler(corridor, 0.5, seed=0)
     low, high = np.array(START) - 0.1, np.array(START) + 0.1
     stream.keep_inside(low, high)
     stream.follow(lambda: 1.0, lambda: InformedSet(np.array([START]), np.array([GOAL]), 1.0))
@@ -73,13 +73,13 @@ def test_draws_stay_in_the_box_where_nothing_shortens_the_path(corridor: Heatmap
 def test_informed_draws_stay_in_the_ellipse(corridor: Heatmap) -> None:
     costs = iter([inf] * 100 + [900.0] * 5000 + [610.0] * 5000)
     informed = InformedSet(np.array([START]), np.array([GOAL]), tolerance=1.0)
-    stream = DrawStream(corridor, 0.5, seed=0)
+    stream = HeatmapSampler(corridor, 0.5, seed=0)
     stream.follow(lambda: next(costs), lambda: informed)
     points = take(stream, 10_100)
     through = informed.shortest_through(points)
     assert (through[100:5100] <= 900).all()
     assert (through[5100:] <= 610).all()
-    assert 0.45 < stream.draws["uniform"] / 10_100 < 0.55, "the mixture stays what it was"
+    assert 0.45 < stream.sample_counts["uniform"] / 10_100 < 0.55, "the mixture stays what it was"
 
 
 def test_no_point_of_a_pixel_is_below_the_bound_of_the_pixel() -> None:
@@ -98,7 +98,7 @@ def test_no_point_of_a_pixel_is_below_the_bound_of_the_pixel() -> None:
 
 def test_informed_set_is_left_when_the_planner_starts_again(corridor: Heatmap) -> None:
     cost = 400.0
-    stream = DrawStream(Heatmap.uniform(corridor.grid), seed=0)
+    stream = HeatmapSampler(Heatmap.uniform(corridor.grid), seed=0)
     stream.follow(lambda: cost, lambda: InformedSet(np.array([START]), np.array([GOAL]), 1.0))
     informed = take(stream, 2000)
     cost = inf
@@ -108,16 +108,16 @@ def test_informed_set_is_left_when_the_planner_starts_again(corridor: Heatmap) -
 
 
 def test_empty_informed_set_does_not_hang(corridor: Heatmap) -> None:
-    stream = DrawStream(corridor, seed=0)
+    stream = HeatmapSampler(corridor, seed=0)
     stream.follow(lambda: 1.0, lambda: InformedSet(np.array([START]), np.array([GOAL]), 0.0))
     assert len(take(stream, 3)) == 3
 
 
 def test_local_draws(two_walls: GridMap, corridor: Heatmap) -> None:
-    stream = DrawStream(corridor, 0.1, seed=0)
+    stream = HeatmapSampler(corridor, 0.1, seed=0)
     near = np.array([stream.near(205, 65, 30) for _ in range(2000)])
     assert (np.abs(near - (205, 65)) <= 30).all()
-    assert stream.draws["learned"] > 1700
+    assert stream.sample_counts["learned"] > 1700
     inside = near[two_walls.is_free(near)].astype(int)
     heat = corridor.values[inside[:, 1], inside[:, 0]]
     window = corridor.values[35:95, 175:235][two_walls.free[35:95, 175:235]]
@@ -129,7 +129,7 @@ def test_local_draws(two_walls: GridMap, corridor: Heatmap) -> None:
 
 
 def test_local_draws_without_heat_are_uniform(corridor: Heatmap) -> None:
-    stream = DrawStream(corridor, 0.1, seed=0)
+    stream = HeatmapSampler(corridor, 0.1, seed=0)
     near = np.array([stream.near(20, 240, 10) for _ in range(500)])
-    assert stream.draws == {"learned": 0, "uniform": 500}
+    assert stream.sample_counts == {"learned": 0, "uniform": 500}
     assert near.std(axis=0).min() > 4
