@@ -1,14 +1,66 @@
-"""Checks of options that several commands have."""
+"""Checks of numbers and of optional packages: one place that decides, one kind of error."""
 
 from __future__ import annotations
 
 from importlib import import_module
+from math import isfinite, nan
+from operator import index
+from typing import SupportsFloat, SupportsIndex
 
 from ..errors import ConfigError, MissingDependencyError
 
 
+def finite_number(name: str, value: float, least: float) -> float:
+    """Return a number as a float.
+
+    Args:
+        name: of the option, for the message.
+        value: any real number; a text or a truth value is none.
+        least: smallest number that is allowed.
+
+    Raises:
+        ConfigError: the value is no finite number, or below ``least``.
+
+    Example:
+        >>> finite_number("radius", 2, 0.0)
+        2.0
+    """
+    number = _to_float(value)
+    if not (isfinite(number) and number >= least):
+        raise ConfigError(f"{name} is a finite number of at least {least:g}, got {value!r}")
+    return number
+
+
+def positive_number(name: str, value: float) -> float:
+    """Return a number above 0 as a float; arguments and errors as for :func:`finite_number`."""
+    number = finite_number(name, value, 0.0)
+    if number == 0:
+        raise ConfigError(f"{name} must be above 0, got {value!r}")
+    return number
+
+
+def whole_number(name: str, value: SupportsIndex, least: int) -> int:
+    """Return a whole number as an int.
+
+    Args:
+        name: of the option, for the message.
+        value: an int or a NumPy integer; a truth value is none.
+        least: smallest number that is allowed.
+
+    Raises:
+        ConfigError: the value is no whole number, or below ``least``.
+    """
+    try:
+        number = index(value)
+    except TypeError:
+        number = least - 1
+    if number < least or isinstance(value, bool):
+        raise ConfigError(f"{name} is a whole number of at least {least}, got {value!r}")
+    return number
+
+
 def check_at_least(name: str, value: int, least: int) -> None:
-    """Refuse a number that is too small.
+    """Raise if a number is too small.
 
     Raises:
         ConfigError: it is below ``least``; the message has the name of the option.
@@ -18,17 +70,22 @@ def check_at_least(name: str, value: int, least: int) -> None:
 
 
 def check_fraction(name: str, value: float) -> None:
-    """Refuse a number that is no share of anything.
+    """Raise if a number is no fraction of anything.
 
     Raises:
         ConfigError: it is below 0, above 1 or NaN; the message has the name of the option.
     """
     if not 0 <= value <= 1:
-        raise ConfigError(f"{name} is a share from 0 to 1, got {value}")
+        raise ConfigError(f"{name} is a fraction from 0 to 1, got {value}")
+
+
+def is_finite_number(value: object) -> bool:
+    """Return whether a value is a finite real number."""
+    return isinstance(value, SupportsFloat) and isfinite(value)
 
 
 def require(package: str, extra: str) -> None:
-    """Check that an optional package is installed.
+    """Raise if an optional package is not installed.
 
     Args:
         package: its name.
@@ -47,9 +104,18 @@ def require(package: str, extra: str) -> None:
 
 
 def require_torch() -> None:
-    """Check that torch is installed.
+    """Raise if torch is not installed.
 
     Raises:
         MissingDependencyError: it is not; the message says how to install it.
     """
     require("torch", "torch")
+
+
+def _to_float(value: object) -> float:
+    if isinstance(value, str | bool):
+        return nan
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        return nan

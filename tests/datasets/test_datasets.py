@@ -472,7 +472,7 @@ def test_exact_labels_of_varied_maps(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("options", "message"),
-    [({"label": "guess"}, "rrt, geodesic"), ({"hard_share": 1.5}, "hard_share is a share")],
+    [({"label": "guess"}, "rrt, geodesic"), ({"hard_share": 1.5}, "hard_share is a fraction")],
 )
 def test_options_of_exact_labels(options: dict[str, Any], message: str) -> None:
     with pytest.raises(ConfigError, match=message):

@@ -201,7 +201,7 @@ def test_as_many_tasks_are_hard_as_were_asked_for() -> None:
         ("size", 40, "size must be at least 48, got 40"),
         ("families", ("blocks", "castles"), "'castles'; there are blocked_cells, blocks"),
         ("families", (), "there are"),
-        ("hard_share", 1.5, "hard_share is a share from 0 to 1, got 1.5"),
+        ("hard_share", 1.5, "hard_share is a fraction from 0 to 1, got 1.5"),
         ("seed", -1, "seed must be at least 0"),
     ],
 )
