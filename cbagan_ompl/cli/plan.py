@@ -159,7 +159,7 @@ def _print_summary(values: dict[str, Any], picture: str | None) -> None:
         "solved": solved,
         "planner": f"{values['planner']}, OMPL {values['ompl_version']}",
         "sampler": f"{values['sampler']}, hook {values['hook'] or 'none'}",
-        "draws": f"{values['draws']['learned']} learned, {values['draws']['uniform']} uniform",
+        "samples": f"{values['sample_counts']['learned']} learned, {values['sample_counts']['uniform']} uniform",
         "nodes": values["nodes"],
         "inference": f"{values['inference_s']:.4f} s",
         "planning": f"{values['planning_s']:.4f} s"
