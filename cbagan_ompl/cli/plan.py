@@ -154,12 +154,12 @@ def _ends(
 
 def _print_summary(values: dict[str, Any], picture: str | None) -> None:
     solved = f"yes, cost {values['cost']:.6g}" if values["solved"] else f"no ({_why(values)})"
-    first = values["first_solution_s"]
+    first, counts = values["first_solution_s"], values["sample_counts"]
     rows = {
         "solved": solved,
         "planner": f"{values['planner']}, OMPL {values['ompl_version']}",
         "sampler": f"{values['sampler']}, hook {values['hook'] or 'none'}",
-        "samples": f"{values['sample_counts']['learned']} learned, {values['sample_counts']['uniform']} uniform",
+        "samples": f"{counts['learned']} learned, {counts['uniform']} uniform",
         "nodes": values["nodes"],
         "inference": f"{values['inference_s']:.4f} s",
         "planning": f"{values['planning_s']:.4f} s"
