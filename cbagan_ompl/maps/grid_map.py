@@ -59,7 +59,8 @@ class GridMap:
 
     Raises:
         MapError: not a 2-D array of at least 1 x 1 pixel, too large (see
-            :func:`cbagan_ompl.maps.raw_map.check_map_size`), no free pixel, or a resolution or origin that is not finite (resolution also positive).
+            :func:`cbagan_ompl.maps.raw_map.check_map_size`), no free pixel, or a resolution or
+            origin that is not finite (resolution also positive).
 
     Example:
         >>> grid = GridMap([[1, 1, 0], [1, 0, 0]], resolution=0.5)
@@ -280,7 +281,8 @@ class GridMap:
         if self.components[v0, u0] != self.components[v1, u1]:
             raise TaskError(
                 f"{self.name}: no path connects start {_show(endpoints[0])} and goal "
-                f"{_show(endpoints[1])}, obstacles separate them; choose both in one connected free part"
+                f"{_show(endpoints[1])}, obstacles separate them; choose both in one "
+                "connected free part"
             )
         return endpoints
 
