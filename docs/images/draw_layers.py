@@ -36,7 +36,7 @@ def main() -> None:
         for column, (name, text, color) in enumerate(boxes):
             x = LEFT + column * (each + GAP)
             parts.append(box(x, top(row), each, HEIGHT, name, text, color))
-    # Only training and inference use the networks, so that the box ends above the ground.
+    # Only training imports the networks, from its own row.
     first = 2
     tall = ground - GAP - top(first)
     parts.append(box(right, top(first), SIDE, tall, "networks", "the architectures", TORCH))
