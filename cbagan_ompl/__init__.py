@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from .planning.validity import GridMotionValidator, GridValidityChecker
     from .plotting import save_figure
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "Adaptation",

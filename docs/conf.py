@@ -1,6 +1,6 @@
 """Settings of the documentation; it is built without any download.
 
-    sphinx-build -W --keep-going -b html docs build/docs
+sphinx-build -W --keep-going -b html docs build/docs
 """
 
 from __future__ import annotations

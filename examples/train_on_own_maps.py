@@ -93,9 +93,7 @@ def main() -> None:
         run("train", folder / "mine", "--output", folder / "runs", *options)
         run("export", folder / "runs" / "best.pt", "--output", folder / "mine.pt")
         run("evaluate", "--dataset", folder / "mine", "--model", folder / "mine.pt")
-        result = plan(
-            MAP, (16.5, 16.5), (220.5, 140.5), model=folder / "mine.pt", time=0.5, seed=1
-        )
+        result = plan(MAP, (16.5, 16.5), (220.5, 140.5), model=folder / "mine.pt", time=0.5, seed=1)
         print("\nplanned with it:", "solved" if result.solved else "not solved")
 
 

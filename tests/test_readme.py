@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
 from cbagan_ompl import GridMap, bundled_maps, reached_planners
-from cbagan_ompl.planning.compat import BOOST_PYTHON, HAS_STATE_SAMPLER_ALLOCATOR
+from cbagan_ompl.planning.compat import BOOST_PYTHON
 
-README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+# The columns of the table of results, from the third on.
+MEASURES = (
+    "first_solution_s",
+    "first_solution_total_s",
+    "within_5_percent_s",
+    "within_5_percent_total_s",
+)
 
 
 def block(marker: str) -> str:
@@ -42,29 +52,47 @@ def test_drop_in_example(tmp_path: Path, planner: str) -> None:
     )
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
-    length, hook, draws = done.stdout.splitlines()[-1].split(" ", 2)
+    length, hook, counts = done.stdout.splitlines()[-1].split(" ", 2)
     assert float(length) > 300
     assert hook == reached_planners()[planner]
-    learned, uniform = (int(n) for n in re.findall(r"\d+", draws))
+    learned, uniform = (int(n) for n in re.findall(r"\d+", counts))
     assert learned > 5 * uniform > 0
 
 
-def test_table_of_hooks() -> None:
-    column = 2 if HAS_STATE_SAMPLER_ALLOCATOR else 1
-    said = {}
-    section = README.split("## Which planners are reached")[1].split("\n## ")[0]
-    for row in re.findall(r"^\| ([\w*, ]+) \| ([^|]+) \| ([^|]+) \|$", section, re.M):
-        for name in row[0].split(", "):
-            said[spelled(name)] = row[column].split(",")[0].replace(" sampler", "-sampler")
-    hooks = {name: hook.replace(" ", "-") for name, hook in said.items()}
-    reached = {n: h for n, h in hooks.items() if h.endswith(("sampler", "injection"))}
-    assert reached == reached_planners()
+def test_table_of_results_is_that_of_the_result_file() -> None:
+    result = json.loads((ROOT / "benchmarks/results/real_maps_ompl_2.0.1.json").read_text())
+    rows = {(row["planner"], row["sampler"]): row for row in result["overall"]}
+    table = README.split("<!-- results -->")[1].split("\n\n")[0].splitlines()[3:]
+    assert len(table) == 7
+    for line in table:
+        planner, sampler, *cells = (cell.strip() for cell in line.strip("|").split("|"))
+        row = rows[spelled(planner.replace("\\", "")), sampler]
+        own = rows[row["planner"], "uniform"]
+        for cell, measure in zip(cells, MEASURES, strict=True):
+            assert cell == text_of(row, own, measure)
+
+
+def text_of(row: dict[str, Any], own: dict[str, Any], measure: str) -> str:
+    if row["censored"][measure] >= 0.5 <= own["censored"][measure]:
+        return "-"
+    ratio = row["ratios"][measure]
+    return f"{ratio['median']:.2f} [{ratio['low']:.2f}, {ratio['high']:.2f}]"
+
+
+def test_is_short() -> None:
+    assert len(README.split()) <= 1300
 
 
 def spelled(name: str) -> str:
+    """Return OMPL's name of a planner."""
     return name.replace("*", "star").replace(" ", "")
 
 
 def test_bundled_maps_are_listed() -> None:
     for name in bundled_maps():
         assert f"`{name}`" in README
+
+
+def test_links_lead_to_files() -> None:
+    for link in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", README):
+        assert (ROOT / link).exists(), link

@@ -1,6 +1,6 @@
 """Draw layers.svg, the picture of the layers in the page on the design.
 
-    python docs/images/draw_layers.py
+python docs/images/draw_layers.py
 """
 
 from __future__ import annotations
@@ -54,9 +54,7 @@ def top(row: int) -> float:
     return TOP + row * (HEIGHT + GAP)
 
 
-def box(
-    x: float, y: float, width: float, height: float, name: str, text: str, color: str
-) -> str:
+def box(x: float, y: float, width: float, height: float, name: str, text: str, color: str) -> str:
     middle, center = x + width / 2, y + height / 2
     return (
         f"<rect x='{x:g}' y='{y:g}' width='{width:g}' height='{height:g}' rx='6' fill='{color}' "

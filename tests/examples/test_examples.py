@@ -26,6 +26,7 @@ def test_all_examples_are_tested() -> None:
     assert sorted(EXPECTED) == sorted(path.name for path in EXAMPLES.glob("*.py"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EXPECTED)
 def test_example_runs(name: str, tmp_path: Path) -> None:
     if name not in WITHOUT_TORCH and importlib.util.find_spec("torch") is None:
