@@ -116,17 +116,17 @@ def _add_world_options(group: Any) -> None:
     group.add_argument(
         "--hard-share",
         type=float,
-        default=settings.hard_share,
+        default=settings.hard_fraction,
         metavar="F",
         help=f"share of tasks whose way is {HARD_DETOUR} times as long as the straight line, or "
-        f"more (default: {settings.hard_share})",
+        f"more (default: {settings.hard_fraction})",
     )
     group.add_argument(
         "--families",
         type=lambda text: tuple(text.split(",")),
-        default=settings.families,
+        default=settings.generators,
         metavar="A,B",
-        help=f"kinds of maps (default: all: {','.join(settings.families)})",
+        help=f"kinds of maps (default: all: {','.join(settings.generators)})",
     )
 
 

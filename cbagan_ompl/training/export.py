@@ -181,11 +181,11 @@ def _data(dataset: dict[str, Any]) -> str:
         f"Drawn while it was trained (`cbagan-ompl train --worlds`, seed {worlds['seed']}): "
         f"{dataset['maps']} new maps of {side} x {side}\n"
         f"pixels in each epoch with {dataset['train_tasks']} tasks, "
-        f"{worlds['hard_share']:.0%} of them hard; {dataset['test_tasks']} tasks on other maps\n"
+        f"{worlds['hard_fraction']:.0%} of them hard; {dataset['test_tasks']} tasks on other maps\n"
         "for testing. The label of a pixel falls with the detour that a path through it takes, to "
         "0.5 at\n"
         f"{worlds['label']['epsilon']:.0%} and {worlds['label']['slack']:g} pixel. Families: "
-        f"{', '.join(worlds['families'])}."
+        f"{', '.join(worlds['generators'])}."
     )
 
 

@@ -51,7 +51,7 @@ class DatasetSource:
         self._training, self.validation = dataset.split(fraction, seed)
         self._dataset = dataset
         self.test = dataset.test
-        self.side = dataset.train.side
+        self.side = dataset.train.size
 
     def epoch(self, number: int) -> Tasks:
         """The training tasks."""
