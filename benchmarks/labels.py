@@ -3,8 +3,9 @@
     python benchmarks/labels.py --maps 16 --json benchmarks/results/labels.json
 
 A network can at best paint what it is taught. Here planners draw from labels themselves: from the
-exact ones of several widths (EPSILON of cbagan_ompl.datasets.geodesic_labels), and from the paper's, the
-union of 50 runs of RRT. Ratios are to OMPL's own sampler, geometric means over the tasks.
+exact ones of several widths (EPSILON of cbagan_ompl.datasets.geodesic_labels), and from the
+paper's, the union of 50 runs of RRT. Ratios are to OMPL's own sampler, geometric means over the
+tasks.
 """
 
 from __future__ import annotations

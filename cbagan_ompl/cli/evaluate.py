@@ -142,7 +142,8 @@ def _check_names(names: list[str]) -> None:
         # It names a file, and a row of a table.
         if any(character in name for character in "/\\|\n\0"):
             raise ConfigError(
-                f"a prediction cannot be called {name!r}; choose a name without / \\ | and line breaks"
+                f"a prediction cannot be called {name!r}; "
+                "choose a name without slashes, bars and line breaks"
             )
 
 

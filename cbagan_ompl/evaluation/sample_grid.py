@@ -88,9 +88,9 @@ def _draw_case(axes: Axes, predicted: NDArray[np.bool_], tasks: Tasks, i: int) -
 
 def _legend_handles() -> list[Patch | Line2D]:
     meanings = (
-        ("found", _FOUND),
-        ("not in the label", _EXCESS),
-        ("missed", _MISSED),
+        ("in both", _FOUND),
+        ("predicted only", _EXCESS),
+        ("true only", _MISSED),
         ("obstacle", _OBSTACLE),
     )
     handles: list[Patch | Line2D] = [Patch(color=colour, label=label) for label, colour in meanings]
