@@ -187,8 +187,7 @@ def _original_numbers(dataset: Dataset, copies: int) -> NDArray[np.int64]:
         return np.arange(len(dataset.map_numbers))
     if min(dataset.map_numbers) < 0:
         raise ConfigError(
-            f"which {copies} maps are copies of one original cannot be told: the maps are not "
-            "called map_K.png"
+            "cannot tell which maps are copies of one original: they are not called map_K.png"
         )
     return np.array(dataset.map_numbers) // copies
 
