@@ -5,23 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from ..common.files import reason
+from ..common.figures import BLUE, OBSTACLE, PURPLE, mark_endpoints, write_figure
 from ..datasets.dataset import Tasks
-from ..errors import ConfigError
 from .evaluator import Evaluation
 
-# Okabe and Ito's palette, which colour-blind readers can tell apart. Start and goal have the marks
-# of the figures of plans.
-_FOUND, _EXCESS, _MISSED = "#0072B2", "#F0E442", "#CC79A7"
-_START, _GOAL = ("o", "#009E73"), ("*", "#D55E00")
-_OBSTACLE = "#4d4d4d"
+# The third is the yellow of Okabe and Ito's palette: orange would be too close to the goal's mark.
+_FOUND, _MISSED, _EXCESS = BLUE, PURPLE, "#F0E442"
 # Half way between obstacle and colour, so that a region on an obstacle shows both.
 _OPACITY_ON_OBSTACLES = 0.5
 
@@ -41,7 +37,7 @@ def save_sample_grid(evaluation: Evaluation, tasks: Tasks, path: Path) -> None:
     """
     ious = evaluation.tasks.counts.iou()
     figure = Figure(figsize=(8.4, 9.1), layout="constrained")
-    cases = _choose_cases(ious)
+    cases, handles = _choose_cases(ious), list[Artist]()
     grid = figure.subplots(len(cases), _CASES, squeeze=False)
     for row, (name, chosen) in zip(grid, cases.items(), strict=True):
         for axes in row:
@@ -49,13 +45,10 @@ def save_sample_grid(evaluation: Evaluation, tasks: Tasks, path: Path) -> None:
             axes.spines[:].set_color("0.7")
         for axes, i in zip(row, chosen.tolist(), strict=False):
             axes.set_title(f"{name}: IoU {ious[i]:.2f}", fontsize=10)
-            _draw_case(axes, evaluation.predicted[i], tasks, i)
-    figure.legend(handles=_legend_handles(), loc="outside lower center", ncols=6, frameon=False)
+            handles = _draw_case(axes, evaluation.predicted[i], tasks, i)
+    figure.legend(handles=handles, loc="outside lower center", ncols=6, frameon=False)
     figure.suptitle(f"{evaluation.name}: predicted and true regions", fontsize=12)
-    try:
-        figure.savefig(path, dpi=120)
-    except OSError as error:
-        raise ConfigError(f"cannot write {path}: {reason(error)}") from error
+    write_figure(figure, path, dots_per_inch=120)
 
 
 def _choose_cases(ious: NDArray[np.float64]) -> dict[str, NDArray[np.intp]]:
@@ -69,9 +62,10 @@ def _choose_cases(ious: NDArray[np.float64]) -> dict[str, NDArray[np.intp]]:
     }
 
 
-def _draw_case(axes: Axes, predicted: NDArray[np.bool_], tasks: Tasks, i: int) -> None:
+def _draw_case(axes: Axes, predicted: NDArray[np.bool_], tasks: Tasks, i: int) -> list[Artist]:
+    """Draw a task with both regions; return the handles of a legend."""
     free, truth = tasks.maps[tasks.map_of[i]].astype(bool), tasks.region[i].astype(bool)
-    image = np.where(free[..., None], np.ones(3), np.array(to_rgb(_OBSTACLE)))
+    image = np.where(free[..., None], np.ones(3), np.array(to_rgb(OBSTACLE)))
     opacity = np.where(free, 1.0, _OPACITY_ON_OBSTACLES)[..., None]
     for mask, colour in (
         (predicted & truth, _FOUND),
@@ -81,23 +75,13 @@ def _draw_case(axes: Axes, predicted: NDArray[np.bool_], tasks: Tasks, i: int) -
         blend = opacity * np.array(to_rgb(colour)) + (1 - opacity) * image
         image[mask] = blend[mask]
     axes.imshow(image, extent=(0, tasks.size, tasks.size, 0), interpolation="nearest")
-    for point, (marker, colour) in ((tasks.start[i], _START), (tasks.goal[i], _GOAL)):
-        size = 9 if marker == "o" else 14
-        axes.plot(*point, marker, color=colour, markeredgecolor="white", markersize=size)
-
-
-def _legend_handles() -> list[Patch | Line2D]:
     meanings = (
         ("in both", _FOUND),
         ("predicted only", _EXCESS),
         ("true only", _MISSED),
-        ("obstacle", _OBSTACLE),
+        ("obstacle", OBSTACLE),
     )
-    handles: list[Patch | Line2D] = [Patch(color=colour, label=label) for label, colour in meanings]
-    for label, (marker, colour) in (("start", _START), ("goal", _GOAL)):
-        size = 8 if marker == "o" else 12
-        handles.append(
-            Line2D([], [], linestyle="none", marker=marker, color=colour, markersize=size)
-        )
-        handles[-1].set_label(label)
-    return handles
+    return [
+        *(Patch(color=colour, label=label) for label, colour in meanings),
+        *mark_endpoints(axes, tasks.start[i], tasks.goal[i], scale=0.9),
+    ]
