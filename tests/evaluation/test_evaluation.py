@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 from helpers.predictions import store
-from helpers.training_set import write_training_set
+from helpers.training_set import TINY, write_training_set
 from scipy.linalg import sqrtm
 
 from cbagan_ompl import ConfigError, DatasetError
@@ -181,13 +181,12 @@ def test_predictions_of_another_size_than_the_labels(dataset: Dataset) -> None:
 @pytest.fixture(scope="module")
 def model(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     pytest.importorskip("torch")
-    from cbagan_ompl.training.config import TrainingConfig
     from cbagan_ompl.training.export import export
     from cbagan_ompl.training.loop import train
     from cbagan_ompl.training.task_sources import DatasetSource
 
     root = tmp_path_factory.mktemp("model")
-    config = TrainingConfig(epochs=1, batch_size=4, widths=(4, 4, 6, 8), discriminator_width=4)
+    config = TINY.updated({"epochs": 1})
     source = DatasetSource(load_dataset(folder), config.validation_fraction, config.seed)
     run = train(source, config, root / "run", device="cpu", progress=False)
     export(run["checkpoint"], root / "tiny.pt")

@@ -1,4 +1,4 @@
-"""A training set of a few simple tasks, written in the published layout."""
+"""A training set of a few simple tasks, written in the published layout, and a recipe for it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,16 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from cbagan_ompl.networks.config import NetworkConfig
+from cbagan_ompl.training.config import TrainingConfig
+
 SIDE = 32
+TINY = TrainingConfig(
+    network=NetworkConfig(widths=(4, 4, 6, 8), discriminator_width=4),
+    epochs=2,
+    batch_size=4,
+    adversarial_every=2,
+)
 
 
 def write_training_set(folder: Path, maps: int = 2, tasks: int = 10) -> Path:
