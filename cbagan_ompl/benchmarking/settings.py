@@ -13,8 +13,12 @@ import yaml
 
 from ..common.validation import check_at_least
 from ..errors import ConfigError
-from ..sampling.adaptation import ADAPTATION_PARTS, Adaptation
-from ..sampling.sampler import DEFAULT_UNIFORM_FRACTION, check_draw_options
+from ..sampling.options import (
+    ADAPTATION_RULES,
+    DEFAULT_UNIFORM_FRACTION,
+    Adaptation,
+    SamplerOptions,
+)
 
 #: OMPL's own sampler, which the others are compared with.
 BASELINE = "uniform"
@@ -58,7 +62,7 @@ class Settings:
     range: float | None = None
     parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     uniform_fraction: float = DEFAULT_UNIFORM_FRACTION
-    adaptation: tuple[str, ...] = ADAPTATION_PARTS
+    adaptation: tuple[str, ...] = ADAPTATION_RULES
     sharpness: float | None = None
     models: Mapping[str, str] = field(default_factory=dict)
     heatmap_dirs: Mapping[str, str] = field(default_factory=dict)
@@ -73,15 +77,20 @@ class Settings:
         for name, value in (("time", self.time), ("range", self.range)):
             if value is not None and not (isfinite(value) and value > 0):
                 raise ConfigError(f"{name} must be above 0, got {value}")
-        check_draw_options(self.uniform_fraction, self.sharpness)
-        Adaptation.of(self.adaptation)
         check_at_least("seed", self.seed, 0)
+        self.sampler_options(self.seed)
         for planner in self.parameters:
             if planner not in self.planners:
                 raise ConfigError(
                     f"a parameter of {planner} is set, which is not among the planners "
                     f"{', '.join(self.planners)}"
                 )
+
+    def sampler_options(self, seed: int) -> SamplerOptions:
+        """Return how samples follow the heat maps."""
+        return SamplerOptions(
+            self.uniform_fraction, self.sharpness, Adaptation.of(self.adaptation), seed
+        )
 
     def save(self, path: Path) -> None:
         """Write the settings as JSON."""

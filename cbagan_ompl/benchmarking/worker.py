@@ -8,9 +8,8 @@ from pathlib import Path
 from zlib import crc32
 
 from ..errors import ConfigError
+from ..planning.heatmap_sources import SAMPLERS, HeatmapSource, heatmap_source
 from ..planning.ompl_benchmark import PlannerVariant, RunOptions, check_variants, run_benchmark
-from ..planning.plan import SAMPLERS, HeatmapSource, heatmap_source
-from ..sampling.adaptation import Adaptation
 from ..sampling.heatmap import Heatmap
 from .logs import ExperimentLog, format_log, join_logs, parse_log
 from .measures import FAMILY, MAP, add_measures
@@ -85,10 +84,7 @@ def _options(job: Job) -> RunOptions:
         time=settings.time,
         range=settings.range,
         tolerance=job.task.grid.resolution,
-        uniform_fraction=settings.uniform_fraction,
-        adaptation=Adaptation.of(settings.adaptation),
-        sharpness=settings.sharpness,
-        seed=(settings.seed + crc32(job.task.name.encode())) % 2**32,
+        sampler=settings.sampler_options((settings.seed + crc32(job.task.name.encode())) % 2**32),
     )
 
 

@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 from helpers.interrupting import interrupted
 
-from cbagan_ompl import ConfigError, GridMap, Heatmap, HeatmapError, PlannerError, Task
+from cbagan_ompl import GridMap, Heatmap, HeatmapError, PlannerError, Task
 from cbagan_ompl.benchmarking.benchmark import Benchmark
 from cbagan_ompl.benchmarking.database import write_tables
 from cbagan_ompl.benchmarking.logs import ExperimentLog, parse_log
@@ -316,12 +316,13 @@ def test_every_task_needs_its_heat_map(two_walls: GridMap, tmp_path: Path) -> No
     assert not (tmp_path / "both").exists()
 
 
-def test_errors_in_events_come_out(two_walls: GridMap, corridor: Heatmap) -> None:
+def test_errors_in_events_come_out(two_walls: GridMap) -> None:
     task = two_walls.check_task((10, 10), (240, 240))
-    entrants = [PlannerVariant("RRTstar", name, lambda *_: corridor) for name in ("one", "two")]
-    options = RunOptions(5, 1.0, uniform_fraction=2)
+    far = Heatmap.uniform(GridMap(np.ones((9, 9), bool), origin=(1e3, 1e3, 0.0)))
+    entrants = [PlannerVariant("RRTstar", name, lambda *_: far) for name in ("one", "two")]
+    options = RunOptions(5, 1.0)
     rounds: list[int] = []
-    with pytest.raises(ConfigError, match="uniform_fraction"):
+    with pytest.raises(HeatmapError, match="coordinates of the map"):
         run_benchmark("x", two_walls, task, entrants, options, lambda: rounds.append(1))
     assert len(rounds) == 1
 

@@ -101,7 +101,7 @@ def test_train_and_export_on_synthetic_maps(
         (["--synthetic", "--hard-fraction", "2"], ConfigError, "hard_fraction"),
     ],
 )
-def test_bad_options_are_told_before_any_map_is_generated(
+def test_bad_options_are_reported_before_any_map_is_generated(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     words: list[str],

@@ -3,7 +3,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from helpers.training_set import TINY, write_training_set
+from helpers.tiny_model import TINY
+from helpers.training_set import write_training_set
 
 from cbagan_ompl.datasets.dataset import Dataset, load_dataset
 from cbagan_ompl.training.task_sources import DatasetSource

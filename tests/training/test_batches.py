@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.patches import CONFIG as PATCHES
-from helpers.training_set import SIDE, TINY
+from helpers.tiny_model import TINY
+from helpers.training_set import SIDE
 
 torch = pytest.importorskip("torch")
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from helpers.training_set import TINY
+from helpers.tiny_model import TINY
 
 torch = pytest.importorskip("torch")
 

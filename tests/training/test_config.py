@@ -5,7 +5,7 @@ from dataclasses import fields
 from pathlib import Path
 
 import pytest
-from helpers.training_set import TINY
+from helpers.tiny_model import TINY
 
 from cbagan_ompl import ConfigError
 from cbagan_ompl.networks.config import NetworkConfig

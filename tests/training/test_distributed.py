@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from helpers.training_set import TINY
+from helpers.tiny_model import TINY
 
 torch = pytest.importorskip("torch")
 

@@ -5,7 +5,7 @@ import warnings
 from pathlib import Path
 
 import pytest
-from helpers.training_set import TINY
+from helpers.tiny_model import TINY
 
 torch = pytest.importorskip("torch")
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers.training_set import TINY
+from helpers.tiny_model import TINY
 
 torch = pytest.importorskip("torch")
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from helpers.synthetic import SMALL, TINY_PATCHES, threaded_source
-from helpers.training_set import TINY
+from helpers.tiny_model import TINY
 
 torch = pytest.importorskip("torch")
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers.training_set import TINY
+from helpers.tiny_model import TINY
 
 from cbagan_ompl.training.config import TrainingConfig
 from cbagan_ompl.training.schedule import learning_rate_factor, plateau_factor

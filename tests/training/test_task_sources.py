@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import json
 import sys
-from dataclasses import fields, replace
+from dataclasses import replace
 from multiprocessing import active_children
 
 import numpy as np
@@ -11,9 +11,9 @@ import pytest
 pytest.importorskip("numba")
 
 from helpers.synthetic import FEW, SMALL, threaded_source
+from helpers.training_set import equal_tasks
 
 from cbagan_ompl import ConfigError, DatasetError, MissingDependencyError
-from cbagan_ompl.datasets.dataset import Tasks
 from cbagan_ompl.datasets.synthetic import (
     TASKS_PER_MAP,
     SyntheticSettings,
@@ -21,13 +21,6 @@ from cbagan_ompl.datasets.synthetic import (
     generate_map_tasks,
 )
 from cbagan_ompl.training.task_sources import SyntheticSchedule, synthetic_source
-
-
-def equal(one: Tasks, other: Tasks) -> bool:
-    return all(
-        np.array_equal(getattr(one, field.name), getattr(other, field.name))
-        for field in fields(Tasks)
-    )
 
 
 @pytest.mark.parametrize("option", ["maps", "held_out", "jobs"])
@@ -42,26 +35,26 @@ def test_processes_generate_what_the_seed_says() -> None:
         assert source.size == 64
         assert source.description()["train_tasks"] == len(generated[0]) == 2 * TASKS_PER_MAP
     expected = concatenate_tasks([generate_map_tasks(SMALL, 0, n) for n in (0, 1)])
-    assert equal(generated[0], expected)
-    assert equal(generated[1], generate_map_tasks(SMALL, 1, 0))
-    assert equal(generated[2], generate_map_tasks(SMALL, 2, 0))
+    assert equal_tasks(generated[0], expected)
+    assert equal_tasks(generated[1], generate_map_tasks(SMALL, 1, 0))
+    assert equal_tasks(generated[2], generate_map_tasks(SMALL, 2, 0))
 
 
 def test_every_epoch_has_new_tasks_and_the_same_ones_again() -> None:
     with threaded_source() as source, threaded_source() as again:
         epochs = [source.epoch(n) for n in range(3)]
         # As a resumed run does.
-        assert equal(again.epoch(2), epochs[2])
-        assert equal(again.validation, source.validation)
+        assert equal_tasks(again.epoch(2), epochs[2])
+        assert equal_tasks(again.validation, source.validation)
     with threaded_source(replace(SMALL, seed=4)) as other:
-        assert not equal(other.epoch(0), epochs[0])
+        assert not equal_tasks(other.epoch(0), epochs[0])
     maps = [*epochs, source.validation, source.test]
     assert len(np.unique(np.concatenate([tasks.maps for tasks in maps]), axis=0)) == 8
     for tasks in epochs:
         assert tasks.map_of.tolist() == [0] * TASKS_PER_MAP + [1] * TASKS_PER_MAP
 
 
-def test_what_a_source_says_of_itself_can_be_written() -> None:
+def test_the_description_of_a_source_can_be_written() -> None:
     with threaded_source() as source:
         description = source.description()
     assert json.loads(json.dumps(description)) == description

@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from helpers.training_set import TINY
+from helpers.tiny_model import TINY
 
 pytest.importorskip("torch")
 
