@@ -40,13 +40,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--device", default="auto")
     parser.add_argument("--batch-size", type=int, default=32)
-    parser.add_argument("--side", type=int, default=64, help="of the images, pixels")
+    parser.add_argument("--size", type=int, default=64, help="of the images, pixels")
     parser.add_argument("--repeats", type=int, default=10)
     parser.add_argument("--threads", type=int, default=1, help="of the CPU")
     args = parser.parse_args()
     torch.set_num_threads(args.threads)
     device = pick_device(args.device)
-    shape = (args.batch_size, 3, args.side, args.side)
+    shape = (args.batch_size, 3, args.size, args.size)
     rows = {}
     for name, memory_format in FORMATS.items():
         generator = make_generator(NetworkConfig()).to(device, memory_format=memory_format)

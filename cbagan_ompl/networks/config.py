@@ -147,7 +147,7 @@ class NetworkConfig:
                 "with self_attention all widths but the first must be at least "
                 f"{_MIN_SELF_ATTENTION_WIDTH}, got {self.widths}"
             )
-        check_values(self, _RULES)
+        check_values(self, RULES)
         if self.patch == 1:
             check_values(self, _RULES_WITHOUT_PATCHES)
 
@@ -174,7 +174,8 @@ class NetworkConfig:
         return replace(self, **convert_values(defaults, values))
 
 
-_RULES = {
+#: The rule of each option that is a number.
+RULES = {
     "stem": AT_LEAST_1,
     "patch": AT_LEAST_1,
     "noise_stem": AT_LEAST_1,

@@ -126,7 +126,7 @@ class TrainingConfig:
                 raise ConfigError(
                     f"{name} is one of {', '.join(choices)}, got {getattr(self, name)!r}"
                 )
-        check_values(self, _RULES)
+        check_values(self, RULES)
 
     @classmethod
     def preset(cls, name: str) -> TrainingConfig:
@@ -220,7 +220,8 @@ _POSITIVE = Rule(lambda value: value > 0, "positive")
 _FACTOR = Rule(lambda value: 0 < value <= 1, "above 0 and at most 1")
 _BELOW_1 = Rule(lambda value: 0 <= value < 1, "at least 0 and below 1")
 
-_RULES = {
+#: The rule of each option that is a number, and of ``scales``.
+RULES = {
     "epochs": AT_LEAST_1,
     # Batch norm needs two tasks where the coarsest stage has one pixel.
     "batch_size": Rule(lambda value: value >= 2, "at least 2"),

@@ -3,13 +3,15 @@ from __future__ import annotations
 import json
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import pytest
 from helpers.tiny_model import TINY
 
 from cbagan_ompl import ConfigError
-from cbagan_ompl.networks.config import NetworkConfig
-from cbagan_ompl.training.config import TrainingConfig
+from cbagan_ompl.networks.config import RULES as NETWORK_RULES
+from cbagan_ompl.networks.config import NetworkConfig, Rule
+from cbagan_ompl.training.config import RULES, TrainingConfig
 
 
 def test_paper_preset_is_the_papers_table() -> None:
@@ -101,3 +103,11 @@ def test_a_recipe_for_another_network() -> None:
     config = TINY.with_network("sa")
     assert not config.network.channel_attention
     assert config.updated({"channel_attention": True}) == TINY
+
+
+@pytest.mark.parametrize(
+    ("kind", "rules"), [(NetworkConfig, NETWORK_RULES), (TrainingConfig, RULES)]
+)
+def test_every_number_has_a_rule(kind: type[Any], rules: dict[str, Rule]) -> None:
+    numbers = {option.name for option in fields(kind) if option.type in ("int", "float")}
+    assert numbers <= rules.keys()
