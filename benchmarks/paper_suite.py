@@ -18,7 +18,7 @@ import numpy as np
 
 from cbagan_ompl.datasets.dataset import Dataset, load_dataset
 from cbagan_ompl.datasets.writing import write_csv
-from cbagan_ompl.evaluation.baselines import stored_predictions
+from cbagan_ompl.evaluation.stored_predictions import load_predictions
 
 STORED = "sagan_test_predictions"
 COLUMNS = ("map", "start_x", "start_y", "goal_x", "goal_y", "family")
@@ -62,7 +62,7 @@ def family(name: str) -> str:
 def write_heatmaps(dataset: Path, folder: Path, chosen: np.ndarray, names: list[str]) -> None:
     """The stored region of each task as an array that ``--heatmap-dir`` reads."""
     folder.mkdir(exist_ok=True)
-    regions = stored_predictions(dataset / STORED, dataset, "test")
+    regions = load_predictions(dataset / STORED, dataset, "test")
     for place, (i, name) in enumerate(zip(chosen, names, strict=True)):
         number = place - names.index(name)
         # Outside the region a little is left, so that every free pixel can be drawn.

@@ -19,7 +19,7 @@ from tqdm import trange
 
 from cbagan_ompl import GridMap, PlanResult, load_model, plan
 from cbagan_ompl.common.files import write_json
-from cbagan_ompl.datasets.geodesic import distances
+from cbagan_ompl.datasets.geodesic import distance_field
 from cbagan_ompl.datasets.synthetic import SyntheticSettings, generate_map_tasks
 from cbagan_ompl.planning.compat import ompl_version
 
@@ -43,7 +43,7 @@ def main() -> None:
         world = generate_map_tasks(SyntheticSettings(), PART, number)
         grid, start, goal = GridMap(world.maps[0]), world.start[0], world.goal[0]
         (u, v), (x, y) = start.astype(int).tolist(), goal.astype(int).tolist()
-        optimum = float(distances(grid.free, (u, v))[y, x])
+        optimum = float(distance_field(grid.free, (u, v))[y, x])
         heatmap = predictor.predict(grid, start, goal)
         for planner in MEASURES:
             options = {"planner": planner, "range": RANGE, "time": TIME, "seed": number}

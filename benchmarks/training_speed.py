@@ -13,8 +13,9 @@ import time
 import numpy as np
 import torch
 
-from cbagan_ompl.training.config import TrainingConfig
-from cbagan_ompl.training.gan import make_generator, pick_device
+from cbagan_ompl.networks.config import NetworkConfig
+from cbagan_ompl.networks.factory import make_generator
+from cbagan_ompl.training.distributed import pick_device
 
 FORMATS = {"contiguous": torch.contiguous_format, "channels-last": torch.channels_last}
 
@@ -39,16 +40,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--device", default="auto")
     parser.add_argument("--batch-size", type=int, default=32)
-    parser.add_argument("--side", type=int, default=64, help="of the images, pixels")
+    parser.add_argument("--size", type=int, default=64, help="of the images, pixels")
     parser.add_argument("--repeats", type=int, default=10)
     parser.add_argument("--threads", type=int, default=1, help="of the CPU")
     args = parser.parse_args()
     torch.set_num_threads(args.threads)
     device = pick_device(args.device)
-    shape = (args.batch_size, 3, args.side, args.side)
+    shape = (args.batch_size, 3, args.size, args.size)
     rows = {}
     for name, memory_format in FORMATS.items():
-        generator = make_generator(TrainingConfig()).to(device, memory_format=memory_format)
+        generator = make_generator(NetworkConfig()).to(device, memory_format=memory_format)
         image = torch.rand(shape, device=device).contiguous(memory_format=memory_format)
         for precision in ("float32", "bfloat16"):
             inputs = (image, image, image[:, :1])
