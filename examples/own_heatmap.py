@@ -17,12 +17,12 @@ import numpy as np
 from cbagan_ompl import GridMap, Heatmap, SamplerOptions, plan
 
 MAP = Path(__file__).parent / "data" / "office.yaml"
-START, GOAL = (-1.2, 6.2), (9.0, 0.0)
+START, GOAL = (-0.5, 4.2), (9.0, 0.0)
 
 grid = GridMap.load(MAP)
 # Rows count from the top of the map, columns from the left, as in Heatmap.values.
 clearance = cv2.distanceTransform(grid.free.astype(np.uint8), cv2.DIST_L2, 5)
-values = np.clip(clearance / 20, 0, 1)
+values = np.clip(clearance / 16, 0, 1)
 values[:66, 78:150] = 0  # the middle room of the upper row
 
 heatmap = Heatmap(values, grid)
