@@ -27,6 +27,7 @@ from .maps.grid_map import GridMap
 from .maps.loading import bundled_maps
 from .maps.tasks import Task, load_tasks, tasks_of
 from .sampling.heatmap import Heatmap
+from .sampling.options import Adaptation, SamplerOptions
 
 if TYPE_CHECKING:
     from .inference.predictor import Predictor, load_model
@@ -38,12 +39,15 @@ if TYPE_CHECKING:
         state_sampler_allocator,
         valid_state_sampler_allocator,
     )
-    from .planning.plan import PlanResult, plan
+    from .planning.plan import plan
+    from .planning.plan_result import PlanResult
     from .planning.validity import GridMotionValidator, GridValidityChecker
+    from .plotting import save_figure
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "Adaptation",
     "Attachment",
     "CbaganOmplError",
     "ConfigError",
@@ -61,6 +65,7 @@ __all__ = [
     "PlanResult",
     "PlannerError",
     "Predictor",
+    "SamplerOptions",
     "Task",
     "TaskError",
     "attach",
@@ -69,6 +74,7 @@ __all__ = [
     "load_tasks",
     "plan",
     "reached_planners",
+    "save_figure",
     "state_sampler_allocator",
     "tasks_of",
     "valid_state_sampler_allocator",
@@ -78,7 +84,8 @@ _HOMES = {
     "inference.predictor": ("Predictor", "load_model"),
     "planning.attach": ("Attachment", "attach"),
     "planning.hooks": ("reached_planners",),
-    "planning.plan": ("PlanResult", "plan"),
+    "planning.plan": ("plan",),
+    "planning.plan_result": ("PlanResult",),
     "planning.ompl_samplers": (
         "HeatmapStateSampler",
         "HeatmapValidStateSampler",
@@ -86,6 +93,7 @@ _HOMES = {
         "valid_state_sampler_allocator",
     ),
     "planning.validity": ("GridMotionValidator", "GridValidityChecker"),
+    "plotting": ("save_figure",),
 }
 _LAZY = {name: module for module, names in _HOMES.items() for name in names}
 

@@ -20,7 +20,7 @@ from .errors import ConfigError
 from .maps.grid_map import GridMap
 
 if TYPE_CHECKING:
-    from .planning.plan import PlanResult
+    from .planning.plan_result import PlanResult
 
 # Okabe and Ito's palette, which colour-blind readers can tell apart.
 _TREE, _PATH, _START, _GOAL = "#0072B2", "#000000", "#009E73", "#D55E00"

@@ -25,7 +25,6 @@ _TIMES = 400  # points of a curve of costs
 
 # Costs are drawn on a logarithmic axis, those nearer to the best known one at its lower end.
 _LEAST_EXCESS = 0.1
-_OPEN = 1e9  # above every axis
 
 
 @dataclass(frozen=True)
@@ -138,16 +137,13 @@ def _success_figure(runs: _Runs) -> Figure:
 def _cost_figure(runs: _Runs, within: int) -> Figure:
     """Draw for each planner the median cost over time and its quartiles."""
     panels, styles = Panels(list(runs), _HEIGHT), _styles(runs)
-    ranges = []
     for axes, by_sampler in zip(panels.axes, runs.values(), strict=True):
         for sampler, of_sampler in by_sampler.items():
-            ranges.append(_draw_cost(axes, of_sampler, styles[sampler]))
+            _draw_cost(axes, of_sampler, styles[sampler])
         axes.axhline(within, color="0.4", linewidth=0.8)
         axes.text(
             0.01, within, f"{within} %", transform=axes.get_yaxis_transform(), va="bottom", size=7
         )
-    values = [within, *(value for values in ranges if values is not None for value in values)]
-    panels.axes[0].set_ylim(min(values) / 1.3, max(values) * 1.3)
     panels.use_logarithm("x")
     panels.use_logarithm("y")
     panels.label(
@@ -157,26 +153,20 @@ def _cost_figure(runs: _Runs, within: int) -> Figure:
     return panels.figure
 
 
-def _draw_cost(axes: Axes, runs: list[_Run], style: Style) -> tuple[float, float] | None:
-    """Draw the median and the quartiles from the time on at which half of the runs have a path.
-
-    Returns:
-        The least and the greatest finite value; None where too few runs have a path.
-    """
+def _draw_cost(axes: Axes, runs: list[_Run], style: Style) -> None:
+    """Draw the median and the quartiles from the time on at which half of the runs have a path."""
     firsts = sorted(run.costs[0][0] for run in runs if run.costs)
     half = -(-len(runs) // 2)
     if len(firsts) < half:
-        return None
+        return
     times = np.geomspace(firsts[half - 1], max(_end(runs), firsts[-1]), _TIMES)
     costs = np.array([_costs_at(run, times) for run in runs])
     excess = np.maximum(100 * (costs - 1), _LEAST_EXCESS)
     low, median, high = np.quantile(excess, (0.25, 0.5, 0.75), axis=0, method="inverted_cdf")
     axes.plot(times, median, **style.line)
     # The upper quartile is infinite until three quarters of the runs have a path.
-    shade = {"color": style.color, "alpha": 0.15, "linewidth": 0}
-    axes.fill_between(times, low, np.minimum(high, _OPEN), **shade)
-    finite = high[np.isfinite(high)]
-    return float(low.min()), float(max([median.max(), *finite]))
+    top = np.where(np.isfinite(high), high, median)
+    axes.fill_between(times, low, top, color=style.color, alpha=0.15, linewidth=0)
 
 
 def _end(runs: Sequence[_Run]) -> float:

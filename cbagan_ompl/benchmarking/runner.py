@@ -14,7 +14,7 @@ from typing import cast
 from tqdm import tqdm
 
 from ..common.parallel import fork_server, interrupts_held
-from .settings import LEARNED
+from ..planning.heatmap_sources import LEARNED
 from .worker import Job, run_job
 
 # Imported once, by the server from which the processes are forked.

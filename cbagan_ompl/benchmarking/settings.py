@@ -13,13 +13,11 @@ import yaml
 from ..common.files import read_text, write_json
 from ..common.validation import check_at_least, positive_number, whole_number
 from ..errors import ConfigError
+from ..planning.heatmap_sources import LEARNED, UNIFORM
 from ..sampling.options import SamplerOptions
 
 #: OMPL's own sampler, which the others are compared with.
-BASELINE = "uniform"
-
-#: The sampler of the bundled model, unless another one is given.
-LEARNED = "learned"
+BASELINE = UNIFORM
 
 #: By default a path is good once its cost is within so many percent of the best known one.
 DEFAULT_WITHIN = 5
@@ -76,7 +74,11 @@ class Settings:
         positive_number("time", self.time)
         if self.range is not None:
             positive_number("range", self.range)
-        whole_number("seed", self.sampler_options.seed, 0)  # type: ignore[arg-type]
+        if not isinstance(self.sampler_options.seed, int):
+            raise ConfigError(
+                f"the seed of a benchmark is an int, got {self.sampler_options.seed!r}"
+            )
+        check_at_least("seed", self.seed, 0)
         whole_number("within", self.within, 1)
         for planner in self.parameters:
             if planner not in self.planners:

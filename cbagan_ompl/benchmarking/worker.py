@@ -9,12 +9,12 @@ from zlib import crc32
 
 from ..common.files import write_atomically
 from ..errors import ConfigError
-from ..planning.heatmap_sources import SAMPLERS, HeatmapSource, heatmap_source
+from ..planning.heatmap_sources import LEARNED, SAMPLERS, HeatmapSource, heatmap_source
 from ..planning.ompl_benchmark import PlannerVariant, RunOptions, check_variants, run_benchmark
 from ..sampling.heatmap import Heatmap
 from .logs import ExperimentLog, concatenate_logs, format_log, parse_log
 from .measures import FAMILY, MAP, add_measures, thresholds
-from .settings import LEARNED, Settings
+from .settings import Settings
 from .tasks import BenchmarkTask, heatmap_file
 
 

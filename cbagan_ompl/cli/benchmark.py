@@ -9,10 +9,11 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from ..benchmarking.settings import LEARNED, Settings, parse_parameters
+from ..benchmarking.settings import Settings, parse_parameters
 from ..common.validation import check_at_least
 from ..errors import ConfigError
 from ..maps.loading import bundled_maps
+from ..planning.heatmap_sources import LEARNED
 from .options import add_map_options, add_sampler_options, map_options, sampler_options
 
 _HELP = """\
@@ -195,7 +196,7 @@ def _settings(args: argparse.Namespace) -> Settings:
         time=args.time,
         range=args.range,
         parameters=parse_parameters(args.set),
-        sampler_options=sampler_options(args, seed=args.seed),
+        sampler_options=sampler_options(args),
         models=models,
         heatmap_dirs=folders,
         radius=args.radius,

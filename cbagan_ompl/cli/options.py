@@ -5,8 +5,13 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ..sampling.adaptation import ADAPTATION_PARTS
-from ..sampling.sampler import DEFAULT_UNIFORM_FRACTION, OPTIMIZING_SHARPNESS
+from ..sampling.options import (
+    ADAPTATION_RULES,
+    DEFAULT_UNIFORM_FRACTION,
+    OPTIMIZING_SHARPNESS,
+    Adaptation,
+    SamplerOptions,
+)
 
 
 def add_map_options(parser: Any) -> None:
@@ -25,7 +30,7 @@ def add_map_options(parser: Any) -> None:
 
 
 def map_options(args: argparse.Namespace) -> dict[str, Any]:
-    """The options of :meth:`cbagan_ompl.GridMap.load` that the arguments ask for."""
+    """Return the options of :meth:`cbagan_ompl.GridMap.load` that the arguments ask for."""
     options: dict[str, Any] = {"unknown_is_free": args.unknown_is_free}
     if args.threshold is not None:
         options["threshold"] = args.threshold
@@ -33,26 +38,42 @@ def map_options(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def add_sampler_options(parser: Any) -> None:
-    """Add the options to a parser or a group of one."""
+    """Add the options of :func:`sampler_options` to a parser or a group of one."""
     parser.add_argument(
         "--uniform-fraction",
         type=float,
         default=DEFAULT_UNIFORM_FRACTION,
         metavar="F",
-        help=f"share of draws that stays uniform (default: {DEFAULT_UNIFORM_FRACTION})",
+        help="fraction of the samples that stays uniform over free space "
+        f"(default: {DEFAULT_UNIFORM_FRACTION})",
     )
     parser.add_argument(
         "--sharpness",
         type=float,
         metavar="P",
-        help="power of the heat map that draws follow (default: by planner, "
-        f"{OPTIMIZING_SHARPNESS:g} for those that look for the shortest path, 1 for the others)",
+        help="exponent of the heat map: samples have a density proportional to its values to the "
+        f"power of P (default: {OPTIMIZING_SHARPNESS:g} for planners that look for the shortest "
+        "path, 1 for those that stop at their first)",
     )
     parser.add_argument(
         "--adaptation",
         type=lambda text: () if text == "none" else tuple(text.split(",")),
-        default=ADAPTATION_PARTS,
+        default=ADAPTATION_RULES,
         metavar="A,B",
-        help="parts of the adaptation of that share that are on, or none "
-        f"(default: all: {','.join(ADAPTATION_PARTS)})",
+        help="rules that adapt samples to the planner's tree, or none "
+        f"(default: all: {','.join(ADAPTATION_RULES)})",
+    )
+
+
+def sampler_options(args: argparse.Namespace) -> SamplerOptions:
+    """Return the options that the arguments ask for, with the seed in ``args.seed``.
+
+    Raises:
+        ConfigError: an option that makes no sense.
+    """
+    return SamplerOptions(
+        uniform_fraction=args.uniform_fraction,
+        sharpness=args.sharpness,
+        adaptation=Adaptation.of(args.adaptation),
+        seed=args.seed,
     )

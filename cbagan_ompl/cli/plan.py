@@ -10,9 +10,8 @@ from ..errors import ConfigError
 from ..maps.grid_map import GridMap
 from ..maps.loading import bundled_maps
 from ..maps.tasks import tasks_of
-from ..sampling.adaptation import Adaptation
 from ..sampling.heatmap import Heatmap
-from .options import add_map_options, add_sampler_options, map_options
+from .options import add_map_options, add_sampler_options, map_options, sampler_options
 
 _PLAN_HELP = """\
 Plan a path on a map with one of OMPL's planners.
@@ -115,14 +114,11 @@ def _plan(args: argparse.Namespace) -> int:
         iterations=args.iterations,
         range=args.range,
         radius=args.radius,
-        seed=args.seed,
-        uniform_fraction=args.uniform_fraction,
-        adaptation=Adaptation.of(args.adaptation),
-        sharpness=args.sharpness,
         model=args.model,
         heatmap=None if args.heatmap is None else Heatmap.load(args.heatmap, grid),
         simplify=args.simplify,
         keep_tree=args.output is not None,
+        options=sampler_options(args),
     )
     values = result.to_dict()
     if args.json is not None:
@@ -154,12 +150,12 @@ def _ends(
 
 def _print_summary(values: dict[str, Any], picture: str | None) -> None:
     solved = f"yes, cost {values['cost']:.6g}" if values["solved"] else f"no ({_why(values)})"
-    first = values["first_solution_s"]
+    first, counts = values["first_solution_s"], values["sample_counts"]
     rows = {
         "solved": solved,
         "planner": f"{values['planner']}, OMPL {values['ompl_version']}",
         "sampler": f"{values['sampler']}, hook {values['hook'] or 'none'}",
-        "samples": f"{values['sample_counts']['learned']} learned, {values['sample_counts']['uniform']} uniform",
+        "samples": f"{counts['learned']} learned, {counts['uniform']} uniform",
         "nodes": values["nodes"],
         "inference": f"{values['inference_s']:.4f} s",
         "planning": f"{values['planning_s']:.4f} s"

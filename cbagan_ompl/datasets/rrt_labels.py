@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..maps.grid_map import GridMap
 from ..planning import compat
 from ..planning.compat import og, ou
-from ..planning.problem import Endpoints, checked_path, simple_setup
+from ..planning.problem import Endpoints, checked_path, make_setup
 
 # A path passes a pixel when one of the points that lie this far apart on it does, in pixels.
 _SPACING = 0.25
@@ -36,7 +36,7 @@ def rrt_region(
     region = np.zeros(grid.shape, dtype=np.bool_)
     with compat.log_level(ou.LOG_ERROR):
         compat.seed_ompl(seed)
-        setup = simple_setup(grid, task, tolerance)
+        setup = make_setup(grid, task, tolerance)
         for _ in repeat(None, runs):
             planner = og.RRT(setup.getSpaceInformation())
             planner.setRange(float(range))

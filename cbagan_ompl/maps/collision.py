@@ -1,4 +1,8 @@
-"""Exact checks of straight segments against a grid of square pixels (Amanatides-Woo traversal)."""
+"""Exact checks of straight segments against a grid of square pixels.
+
+The pixels that a segment passes through are visited one by one: Amanatides and Woo, "A fast voxel
+traversal algorithm for ray tracing", Eurographics 1987, https://doi.org/10.2312/egtp.19871000.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +15,7 @@ _TIE = 1e-12
 def segment_is_free(  # noqa: C901 - the inner loop of every planner, so nothing is factored out
     cells: bytes, width: int, height: int, u0: float, v0: float, u1: float, v1: float
 ) -> bool:
-    """Whether every pixel that the segment passes through is free.
+    """Return whether every pixel that a segment passes through is free.
 
     A point belongs to the pixel (floor(u), floor(v)). Where the segment passes exactly through a
     corner that four pixels share, all four must be free: there is no gap between two obstacles

@@ -6,23 +6,22 @@ from collections.abc import Sequence
 from functools import cached_property
 from math import cos, isfinite, sin
 from os import PathLike
-from typing import Any, NamedTuple, SupportsFloat
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..common.validation import is_finite_number
 from ..errors import MapError, TaskError
 from .collision import segment_is_free
-
-#: Longest side and largest area of a map, in pixels. Larger files are refused before memory is
-#: spent on them: a learned plan takes about 140 bytes a pixel.
-MAX_SIDE = 16384
-MAX_PIXELS = 2**26
+from .connectivity import label_components
+from .loading import read_map
+from .raw_map import check_map_size
 
 
 class Affine(NamedTuple):
-    """The map (x, y) -> (a x + b y + c, d x + e y + f)."""
+    """The affine function (x, y) -> (a x + b y + c, d x + e y + f)."""
 
     a: float
     b: float
@@ -59,8 +58,14 @@ class GridMap:
         name: what the map is called in messages and results.
 
     Raises:
-        MapError: not a 2-D array of at least 1 x 1 pixel, longest side above ``MAX_SIDE``, no
-            free pixel, or a resolution or origin that is not finite (resolution also positive).
+        MapError: not a 2-D array of at least 1 x 1 pixel, too large (see
+            :func:`cbagan_ompl.maps.raw_map.check_map_size`), no free pixel, or a resolution or
+            origin that is not finite (resolution also positive).
+
+    Example:
+        >>> grid = GridMap([[1, 1, 0], [1, 0, 0]], resolution=0.5)
+        >>> grid.shape, bool(grid.is_free((0.2, 0.8)))
+        ((2, 3), True)
     """
 
     def __init__(
@@ -85,7 +90,7 @@ class GridMap:
             raise MapError(f"{name}: a map holds booleans or numbers, not {cells.dtype}")
         if cells.dtype.kind == "f" and not np.isfinite(cells).all():
             raise MapError(f"{name}: the map holds NaN or infinite values")
-        if not (_is_number(resolution) and resolution > 0 and isfinite(1 / resolution)):
+        if not (is_finite_number(resolution) and resolution > 0 and isfinite(1 / resolution)):
             raise MapError(
                 f"{name}: resolution is the length of a pixel in world units and must be "
                 f"positive, got {resolution!r}"
@@ -93,7 +98,7 @@ class GridMap:
         if origin is not None and not (
             isinstance(origin, Sequence | np.ndarray)
             and len(origin) == 3
-            and all(map(_is_number, origin))
+            and all(map(is_finite_number, origin))
         ):
             raise MapError(f"{name}: origin is (x, y, yaw) with finite numbers, got {origin!r}")
         self.free: NDArray[np.bool_] = np.ascontiguousarray(cells != 0)
@@ -120,9 +125,8 @@ class GridMap:
             MapError: the file is missing, unreadable, truncated, empty or of an unknown kind.
             ConfigError: an unknown option, or one with a value that makes no sense.
         """
-        from .loading import load_map
-
-        return load_map(path, **options)
+        raw = read_map(path, **options)
+        return cls(raw.free, raw.resolution, raw.origin, name=raw.name)
 
     @property
     def width(self) -> int:
@@ -169,11 +173,11 @@ class GridMap:
         return Affine(c, s, x - s * self.height, s, -c, y + c * self.height)
 
     def to_pixel(self, points: ArrayLike) -> NDArray[np.float64]:
-        """World points, shape (..., 2), as continuous pixel coordinates (u, v)."""
+        """Return world points, shape (..., 2), as continuous pixel coordinates (u, v)."""
         return self.pixel_from_world(np.asarray(points, dtype=np.float64))
 
     def to_world(self, pixels: ArrayLike) -> NDArray[np.float64]:
-        """Continuous pixel coordinates (u, v), shape (..., 2), as world points."""
+        """Return continuous pixel coordinates (u, v), shape (..., 2), as world points."""
         return self.world_from_pixel(np.asarray(pixels, dtype=np.float64))
 
     @property
@@ -185,7 +189,10 @@ class GridMap:
         return corners.min(axis=0), corners.max(axis=0)
 
     def is_free(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """Whether world points, shape (..., 2), lie in free pixels; outside the map is not free."""
+        """Return whether world points, shape (..., 2), lie in free pixels.
+
+        Outside the map nothing is free.
+        """
         pixels = self.to_pixel(points)
         within = (pixels >= 0) & (pixels < (self.width, self.height))
         inside: NDArray[np.bool_] = np.asarray(within.all(axis=-1))
@@ -194,7 +201,7 @@ class GridMap:
         return result
 
     def path_is_free(self, path: ArrayLike) -> bool:
-        """Whether a polyline of world points, shape (N, 2), stays in free pixels.
+        """Return whether a polyline of world points, shape (N, 2), stays in free pixels.
 
         The check is exact (see :func:`cbagan_ompl.maps.collision.segment_is_free`).
         """
@@ -207,12 +214,12 @@ class GridMap:
         )
 
     def inflated(self, radius: float) -> GridMap:
-        """The map for a disc-shaped robot, as a map for its centre.
+        """Return the map for the centre of a disc-shaped robot: obstacles grown by its radius.
 
         Every point of a pixel that stays free is at least ``radius`` away from every point of
         every blocked pixel (square to square), and every pixel for which that holds stays free.
-        So the robot cannot touch an obstacle wherever in the pixel its centre is; the price is
-        that up to a pixel's diagonal of room is given away. The border of the map is no obstacle.
+        So the robot cannot touch an obstacle wherever in the pixel its centre is. The cost is that
+        up to a pixel's diagonal of room is given away. The border of the map is no obstacle.
 
         Args:
             radius: in world units; 0 returns the map itself, any more blocks the pixels that
@@ -221,7 +228,7 @@ class GridMap:
         Raises:
             MapError: radius negative or not finite, or nothing stays free.
         """
-        if not _is_number(radius) or radius < 0:
+        if not is_finite_number(radius) or radius < 0:
             raise MapError(f"the robot radius must be a length of at least 0, got {radius!r}")
         if radius == 0 or self.free.all():
             return self
@@ -246,7 +253,7 @@ class GridMap:
 
         From centre to centre, within two hundredths; what lies outside of the map does not count.
         """
-        # The quick mask is near enough for what asks, and a third of the price of the exact one.
+        # The quick mask is near enough for what asks, and a third of the cost of the exact one.
         distance = cv2.distanceTransform(self.free.view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
         return np.asarray(distance, np.float32)
 
@@ -256,30 +263,28 @@ class GridMap:
 
         4-connected, because no motion passes between two obstacles that touch diagonally.
         """
-        labels = cv2.connectedComponents(self.free.astype(np.uint8), connectivity=4)[1]
-        return labels.astype(np.int32, copy=False)
+        return label_components(self.free, connectivity=4)
 
     def check_task(
         self, start: ArrayLike, goal: ArrayLike
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Check that a start and a goal can be planned for, and return them as (2,) arrays.
+        """Return start and goal as (2,) arrays, or raise if they cannot be planned for.
 
         Raises:
             TaskError: one of them is no point, outside the map or in an obstacle, the two are
-                equal, or no path joins them.
+                equal, or no path connects them.
         """
-        ends = self._check_point("start", start), self._check_point("goal", goal)
-        if np.array_equal(*ends):
-            raise TaskError(f"start and goal are the same point {_show(ends[0])}")
-        parts = [
-            self.components[row, column] for column, row in self.to_pixel(ends).astype(np.intp)
-        ]
-        if parts[0] != parts[1]:
+        endpoints = self._check_point("start", start), self._check_point("goal", goal)
+        if np.array_equal(*endpoints):
+            raise TaskError(f"start and goal are the same point {_show(endpoints[0])}")
+        (u0, v0), (u1, v1) = self.to_pixel(endpoints).astype(np.intp)
+        if self.components[v0, u0] != self.components[v1, u1]:
             raise TaskError(
-                f"{self.name}: no path joins start {_show(ends[0])} and goal {_show(ends[1])}, "
-                "obstacles separate them; choose both in one connected free part"
+                f"{self.name}: no path connects start {_show(endpoints[0])} and goal "
+                f"{_show(endpoints[1])}, obstacles separate them; choose both in one "
+                "connected free part"
             )
-        return ends
+        return endpoints
 
     def _check_point(self, role: str, point: ArrayLike) -> NDArray[np.float64]:
         try:
@@ -308,23 +313,6 @@ class GridMap:
         return (
             f"GridMap({self.name!r}, {self.width} x {self.height} pixels of {self.resolution:g}, "
             f"{frame}, {self.free.mean():.0%} free)"
-        )
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, SupportsFloat) and isfinite(value)
-
-
-def check_map_size(width: int, height: int, name: str) -> None:
-    """Refuse maps too large to plan on.
-
-    Raises:
-        MapError: more than :data:`MAX_SIDE` pixels a side or :data:`MAX_PIXELS` in all.
-    """
-    if max(width, height) > MAX_SIDE or width * height > MAX_PIXELS:
-        raise MapError(
-            f"{name}: {width} x {height} pixels; maps up to {MAX_SIDE} pixels a side and "
-            f"{MAX_PIXELS} pixels in all are supported, scale it down first"
         )
 
 

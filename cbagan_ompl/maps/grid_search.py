@@ -1,4 +1,4 @@
-"""Shortest paths over the free pixels of a grid, for the controls and for joining heat maps."""
+"""Shortest paths over the free pixels of a grid, for the corridor and for repairing heat maps."""
 
 from __future__ import annotations
 
@@ -25,50 +25,55 @@ def shortest_path(
     start: tuple[int, int],
     goal: tuple[int, int],
     cost: NDArray[np.float32] | None = None,
-    coarse_side: int = 256,
+    coarse_size: int = 256,
 ) -> NDArray[np.intp] | None:
-    """Cheapest 8-connected path between two pixels.
+    """Return the cheapest 8-connected path between two pixels.
 
     A diagonal step needs both pixels beside it free, so that the path is a valid motion. Large
     grids are searched around the path through a coarse grid first, so that their path may be a
-    little dearer than the cheapest.
+    little costlier than the cheapest.
 
     Args:
         free: shape (H, W).
         start: (column, row) of a free pixel.
         goal: (column, row) of a free pixel.
-        cost: price of a pixel length in each pixel, shape (H, W), positive; 1 by default. A step
-            costs its length times the mean price of its two pixels.
-        coarse_side: longest side of the coarse grid; grids up to twice as long need none.
+        cost: cost of a pixel length in each pixel, shape (H, W), positive; 1 by default. A step
+            costs its length times the mean cost of its two pixels.
+        coarse_size: longest side of the coarse grid, in pixels; grids up to twice as long need
+            none.
 
     Returns:
-        Pixels (column, row), shape (K, 2), both ends included; None where nothing joins them.
+        Pixels (column, row), shape (K, 2), both endpoints included; None where no path connects
+        them.
     """
-    price = np.ones(free.shape, np.float32) if cost is None else cost
-    if max(free.shape) > 2 * coarse_side:
-        band = _coarse_band(free, start, goal, price, coarse_side)
-        path = None if band is None else _search(free & band, start, goal, price)
+    costs = np.ones(free.shape, np.float32) if cost is None else cost
+    if max(free.shape) > 2 * coarse_size:
+        band = _coarse_band(free, start, goal, costs, coarse_size)
+        path = None if band is None else _search(free & band, start, goal, costs)
         if path is not None:
             return path
-    return _search(free, start, goal, price)
+    return _search(free, start, goal, costs)
 
 
 def _coarse_band(
     free: NDArray[np.bool_],
     start: tuple[int, int],
     goal: tuple[int, int],
-    price: NDArray[np.float32],
-    coarse_side: int,
+    costs: NDArray[np.float32],
+    coarse_size: int,
 ) -> NDArray[np.bool_] | None:
-    """Pixels near the cheapest path through blocks of pixels, free where any of their pixels is."""
-    size = -(-max(free.shape) // coarse_side)
+    """Return the pixels near the cheapest path through blocks of pixels.
+
+    A block is free where any of its pixels is.
+    """
+    size = -(-max(free.shape) // coarse_size)
     padding = [(0, -side % size) for side in free.shape]
     blocks = np.pad(free, padding)
     shape = blocks.shape[0] // size, size, blocks.shape[1] // size, size
     coarse = np.asarray(blocks.reshape(shape).any(axis=(1, 3)))
-    coarse_price = np.pad(price, padding, mode="edge").reshape(shape).mean(axis=(1, 3))
+    coarse_cost = np.pad(costs, padding, mode="edge").reshape(shape).mean(axis=(1, 3))
     source, target = ((u // size, v // size) for u, v in (start, goal))
-    path = _search(coarse, source, target, coarse_price)
+    path = _search(coarse, source, target, coarse_cost)
     if path is None:
         return None
     visited = np.zeros(coarse.shape, np.uint8)
@@ -82,14 +87,14 @@ def _search(
     free: NDArray[np.bool_],
     start: tuple[int, int],
     goal: tuple[int, int],
-    price: NDArray[np.float32],
+    costs: NDArray[np.float32],
 ) -> NDArray[np.intp] | None:
-    """Dijkstra's search over the free pixels."""
+    """Search the free pixels by Dijkstra's algorithm (https://doi.org/10.1007/BF01386390)."""
     node = np.full(free.shape, -1, np.int32)
     pixels = np.flatnonzero(free)
     node.ravel()[pixels] = np.arange(len(pixels))
     source, target = (int(node[v, u]) for u, v in (start, goal))
-    graph = _grid_graph(free, price, node, len(pixels))
+    graph = _grid_graph(free, costs, node, len(pixels))
     _, predecessors = dijkstra(graph, directed=False, indices=source, return_predecessors=True)
     nodes = [target]
     while nodes[-1] != source:
@@ -102,7 +107,7 @@ def _search(
 
 
 def _grid_graph(
-    free: NDArray[np.bool_], price: NDArray[np.float32], node: NDArray[np.int32], count: int
+    free: NDArray[np.bool_], costs: NDArray[np.float32], node: NDArray[np.int32], count: int
 ) -> csr_array:
     height, width = free.shape
     tails, heads, weights = [], [], []
@@ -114,7 +119,7 @@ def _grid_graph(
             passable &= free[here[0], there[1]] & free[there[0], here[1]]
         tails.append(node[here][passable])
         heads.append(node[there][passable])
-        weights.append(np.hypot(down, right) * 0.5 * (price[here] + price[there])[passable])
+        weights.append(np.hypot(down, right) * 0.5 * (costs[here] + costs[there])[passable])
     return csr_array(
         (np.concatenate(weights), (np.concatenate(tails), np.concatenate(heads))),
         shape=(count, count),

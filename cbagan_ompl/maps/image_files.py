@@ -1,4 +1,4 @@
-"""Map pictures: PNG, JPEG, BMP and PGM files as gray levels, complete or not at all."""
+"""Image files of maps: PNG, JPEG, BMP and PGM files as gray levels, complete or not at all."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import MapError
-from .grid_map import check_map_size
+from .raw_map import check_map_size
 
 #: Suffixes of the files that :func:`decode_image` reads, in lower case.
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".pgm")
 
 
 class DecodedImage(NamedTuple):
-    """A decoded picture.
+    """The gray levels of an image file.
 
     Attributes:
         gray: (H, W), 0 (black) to ``white``; colour is weighted as in ITU-R BT.601 (0.299 red,
             0.587 green, 0.114 blue).
         white: the brightest gray level, 255 or 65535 or the one that a PGM names.
-        opaque: (H, W), false where the picture is transparent to any degree; None where the file
+        opaque: (H, W), false where the image is transparent to any degree; None where the file
             has no alpha channel.
     """
 
@@ -33,7 +33,7 @@ class DecodedImage(NamedTuple):
 
 
 def decode_image(data: bytes, name: str) -> DecodedImage:
-    """Decode a picture file, told by its first bytes.
+    """Decode an image file, told by its first bytes.
 
     Pixels are taken as stored: a rotation that the EXIF data ask for is not applied.
 
@@ -43,7 +43,7 @@ def decode_image(data: bytes, name: str) -> DecodedImage:
 
     Raises:
         MapError: empty, truncated, damaged, none of the four formats, or longer on a side than
-            :data:`cbagan_ompl.maps.grid_map.MAX_SIDE` (found out before it is decoded).
+            :data:`cbagan_ompl.maps.raw_map.MAX_SIDE` (found out before it is decoded).
     """
     if not data:
         raise MapError(f"{name}: the file is empty")
@@ -58,17 +58,17 @@ def decode_image(data: bytes, name: str) -> DecodedImage:
     elif data.startswith(b"BM"):
         size, whole = _measure_bmp(data)
     else:
-        raise MapError(f"{name}: the content is no PNG, JPEG, BMP or PGM picture")
+        raise MapError(f"{name}: the content is no PNG, JPEG, BMP or PGM image")
     check_map_size(*size, name)
     if not whole:
-        raise MapError(f"{name}: the picture is truncated, get a complete copy of the file")
+        raise MapError(f"{name}: the image is truncated, get a complete copy of the file")
     try:
         # None for damaged files, whatever the annotations of OpenCV say.
         pixels: Any = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error as error:
-        raise MapError(f"{name}: the picture cannot be decoded: {error.err}") from error
+        raise MapError(f"{name}: the image cannot be decoded: {error.err}") from error
     if pixels is None or pixels.dtype not in (np.uint8, np.uint16):
-        raise MapError(f"{name}: the picture is damaged or of a kind that OpenCV cannot decode")
+        raise MapError(f"{name}: the image is damaged or of a kind that OpenCV cannot decode")
     white = 255 if pixels.dtype == np.uint8 else 65535
     if pixels.ndim == 2:
         return DecodedImage(pixels.astype(np.uint16), white, None)
@@ -156,7 +156,7 @@ def _decode_pgm(data: bytes, name: str) -> DecodedImage:
             raise MapError(f"{name}: the PGM holds something that is no number: {error}") from error
     if levels.size < width * height:
         raise MapError(
-            f"{name}: the picture is truncated, {width} x {height} pixels are announced and "
+            f"{name}: the image is truncated, {width} x {height} pixels are announced and "
             f"{levels.size} are there"
         )
     levels = levels[: width * height]

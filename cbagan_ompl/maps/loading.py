@@ -1,4 +1,8 @@
-"""Map files of every kind, told by their suffix, and the maps that come with the package."""
+"""Map files of every kind, told by their suffix, and the maps that come with the package.
+
+Each reader returns a :class:`.raw_map.RawMap`, of which :meth:`cbagan_ompl.GridMap.load` makes the
+map.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +16,10 @@ import numpy as np
 
 from ..common.files import read_bytes
 from ..errors import ConfigError, MapError
-from .grid_map import GridMap
 from .image_files import SUFFIXES, decode_image
-from .movingai import load_movingai_map
-from .ros import load_ros_map
+from .movingai import read_movingai_map
+from .raw_map import RawMap
+from .ros import read_ros_map
 
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
@@ -29,11 +33,11 @@ class MapOptions:
     """How map files are read.
 
     Attributes:
-        threshold: plain pictures only: a pixel is free when its gray level divided by white (255
+        threshold: plain images only: a pixel is free when its gray level divided by white (255
             for 8 bits) is at least this, 0 to 1. With 0.5 the level 127 is blocked and 128 free.
             ROS maps bring their own thresholds, MovingAI maps need none.
         unknown_is_free: whether pixels of unknown state are free. Unknown are the transparent
-            pixels of a picture (any alpha below full), and in a ROS map also those that are
+            pixels of an image (any alpha below full), and in a ROS map also those that are
             neither free nor occupied, see :mod:`cbagan_ompl.maps.ros`.
 
     Raises:
@@ -51,8 +55,8 @@ class MapOptions:
             raise ConfigError(f"unknown_is_free is True or False, got {self.unknown_is_free!r}")
 
 
-def load_map(path: str | os.PathLike[str], **options: Any) -> GridMap:
-    """Read a map file; see :meth:`cbagan_ompl.GridMap.load`, which this stands behind.
+def read_map(path: str | os.PathLike[str], **options: Any) -> RawMap:
+    """Read a map file; :meth:`cbagan_ompl.GridMap.load` is the public way to it.
 
     Args:
         path: the file, or ``bundled:NAME``. The map is called after the file, without suffix.
@@ -68,41 +72,48 @@ def load_map(path: str | os.PathLike[str], **options: Any) -> GridMap:
             raise ConfigError(f"unknown map option {option!r}; known are {', '.join(known)}")
     settings = MapOptions(**options)
     if str(path).startswith(BUNDLED):
-        return _load_bundled(str(path).removeprefix(BUNDLED), settings)
+        return _read_bundled(str(path).removeprefix(BUNDLED), settings)
 
     file = Path(path)
     suffix = file.suffix.lower()
     if suffix in SUFFIXES:
-        return _picture_map(read_bytes(file), str(file), file.stem, settings)
+        return _read_image_map(read_bytes(file), str(file), file.stem, settings)
     if suffix in (".yaml", ".yml"):
-        return load_ros_map(file, unknown_is_free=settings.unknown_is_free)
+        return read_ros_map(file, unknown_is_free=settings.unknown_is_free)
     if suffix == ".map":
-        return load_movingai_map(file)
+        return read_movingai_map(file)
     raise MapError(
-        f"{file}: unknown kind of map file; known are {', '.join(SUFFIXES)} (pictures), .yaml and "
+        f"{file}: unknown kind of map file; known are {', '.join(SUFFIXES)} (images), .yaml and "
         f".yml (ROS map_server), .map (MovingAI) and {BUNDLED}NAME"
     )
 
 
 def bundled_maps() -> tuple[str, ...]:
-    """The names of the maps that come with the package, for ``GridMap.load("bundled:NAME")``."""
+    """Return the names of the maps that come with the package.
+
+    ``GridMap.load("bundled:NAME")`` loads one of them.
+
+    Example:
+        >>> "maze" in bundled_maps()
+        True
+    """
     names = (Path(entry.name) for entry in bundled_folder().iterdir())
     return tuple(sorted(name.stem for name in names if name.suffix == ".png"))
 
 
 def bundled_folder() -> Traversable:
-    """Where the maps that come with the package and their ``tasks.csv`` are."""
+    """Return the folder of the maps that come with the package and of their ``tasks.csv``."""
     return resources.files("cbagan_ompl") / "maps" / "bundled"
 
 
-def _load_bundled(name: str, settings: MapOptions) -> GridMap:
+def _read_bundled(name: str, settings: MapOptions) -> RawMap:
     if name not in bundled_maps():
         raise MapError(f"no map {name!r} is bundled; there are {', '.join(bundled_maps())}")
     data = (bundled_folder() / f"{name}.png").read_bytes()
-    return _picture_map(data, BUNDLED + name, name, settings)
+    return _read_image_map(data, BUNDLED + name, name, settings)
 
 
-def _picture_map(data: bytes, place: str, name: str, settings: MapOptions) -> GridMap:
+def _read_image_map(data: bytes, place: str, name: str, settings: MapOptions) -> RawMap:
     gray, white, opaque = decode_image(data, place)
     free = (np.arange(white + 1) / white >= settings.threshold)[gray]
     if opaque is not None:
@@ -112,4 +123,4 @@ def _picture_map(data: bytes, place: str, name: str, settings: MapOptions) -> Gr
             f"{place}: no pixel is opaque and as bright as the threshold {settings.threshold:g}; "
             "choose a lower threshold, or unknown_is_free where free space is transparent"
         )
-    return GridMap(free, name=name)
+    return RawMap(free, name)

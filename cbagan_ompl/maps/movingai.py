@@ -12,13 +12,13 @@ import numpy as np
 
 from ..common.files import read_text
 from ..errors import MapError
-from .grid_map import GridMap, check_map_size
+from .raw_map import RawMap, check_map_size
 
 _FREE = ".GS"
 _BLOCKED = "@OTW"
 
 
-def load_movingai_map(path: Path) -> GridMap:
+def read_movingai_map(path: Path) -> RawMap:
     """Read a MovingAI ``.map``; one character becomes one pixel, in the image frame.
 
     Ground (``.`` and ``G``) and swamp (``S``) are free; out of bounds (``@`` and ``O``), trees
@@ -64,11 +64,11 @@ def load_movingai_map(path: Path) -> GridMap:
         )
     characters = np.frombuffer("".join(rows).encode("ascii"), dtype=np.uint8)
     free = np.isin(characters, np.frombuffer(_FREE.encode("ascii"), dtype=np.uint8))
-    return GridMap(free.reshape(height, width), name=path.stem)
+    return RawMap(free.reshape(height, width), path.stem)
 
 
 def _count(path: Path, lines: list[str], key: str) -> int:
-    """The positive number of the header line that begins with ``key``."""
+    """Return the positive number of the header line that begins with ``key``."""
     for number, line in enumerate(lines[:4], start=1):
         words = line.split()
         if words[:1] == [key]:
@@ -95,7 +95,7 @@ def read_scenarios(path: Path) -> list[Scenario]:
     """Read a MovingAI ``.scen`` file, cells as (column, row).
 
     The ninth field, the optimal length, is checked to be a number and left out: see
-    :func:`cbagan_ompl.maps.tasks.load_tasks`.
+    :func:`cbagan_ompl.load_tasks`.
 
     Raises:
         MapError: the file cannot be read, is no version 1 scenario file, or has a malformed line

@@ -1,4 +1,4 @@
-"""ROS map_server maps: a YAML file that says how to read the picture beside it.
+"""ROS map_server maps: a YAML file that says how to read the image beside it.
 
 The rules are those of nav2's map_server. With p the darkness of a pixel, (255 - gray) / 255, or its
 brightness where ``negate`` is set:
@@ -28,8 +28,8 @@ from numpy.typing import NDArray
 
 from ..common.files import read_bytes
 from ..errors import MapError
-from .grid_map import GridMap
 from .image_files import DecodedImage, decode_image
+from .raw_map import RawMap
 
 _REQUIRED = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
 _MODES = ("trinary", "scale", "raw")
@@ -112,22 +112,22 @@ class _Description:
         return mode.lower()
 
     @property
-    def picture(self) -> DecodedImage:
-        image = self.keys["image"]
-        if not isinstance(image, str) or not image:
-            raise self.error("image", "must be the path of a picture, relative to this file")
-        path = self.path.parent / image
+    def image(self) -> DecodedImage:
+        file = self.keys["image"]
+        if not isinstance(file, str) or not file:
+            raise self.error("image", "must be the path of an image, relative to this file")
+        path = self.path.parent / file
         try:
             return decode_image(read_bytes(path), str(path))
         except MapError as error:
             raise self.error("image", str(error)) from error
 
 
-def load_ros_map(path: Path, *, unknown_is_free: bool) -> GridMap:
-    """Read a map_server YAML file and its picture: metres, y up, origin and yaw applied.
+def read_ros_map(path: Path, *, unknown_is_free: bool) -> RawMap:
+    """Read a map_server YAML file and its image: metres, y up, with its origin and yaw.
 
     Args:
-        path: the YAML file; the path of the picture in it is relative to its folder.
+        path: the YAML file; the path of the image in it is relative to its folder.
         unknown_is_free: whether pixels that are neither free nor occupied count as free.
 
     Raises:
@@ -136,7 +136,7 @@ def load_ros_map(path: Path, *, unknown_is_free: bool) -> GridMap:
     description = _Description(path)
     resolution, origin, mode = description.resolution, description.origin, description.mode
     (free_thresh, occupied_thresh), negate = description.thresholds, description.negate
-    gray, white, opaque = description.picture
+    gray, white, opaque = description.image
 
     # Decided for each gray level first: that is quick, and leaves 0.2 equal to (255 - 204) / 255.
     levels = np.arange(white + 1)
@@ -153,7 +153,7 @@ def load_ros_map(path: Path, *, unknown_is_free: bool) -> GridMap:
         free = free | ~opaque if unknown_is_free else free & opaque
     if not free.any():
         raise MapError(
-            f"{path}: no pixel of the picture is free with mode {mode}, negate {int(negate)} and "
+            f"{path}: no pixel of the image is free with mode {mode}, negate {int(negate)} and "
             f"free_thresh {free_thresh:g}; if all are unknown, try unknown_is_free"
         )
-    return GridMap(free, resolution, origin, name=path.stem)
+    return RawMap(free, path.stem, resolution, origin)

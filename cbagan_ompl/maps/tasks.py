@@ -27,6 +27,10 @@ class Task:
         goal: (x, y) in the map's world coordinates.
         optimal_cost: length of the shortest path in world units, where it is known.
         family: what kind of map it is on, where that is known.
+
+    Example:
+        >>> Task((1.5, 2.0), (14.0, -3.0)).optimal_cost is None
+        True
     """
 
     start: tuple[float, float]
@@ -36,7 +40,7 @@ class Task:
 
 
 def load_tasks(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
-    """Read the tasks for a map from a MovingAI ``.scen`` or a ``.csv`` file.
+    r"""Read the tasks for a map from a MovingAI ``.scen`` or a ``.csv`` file.
 
     A ``.scen`` file belongs to one map, whose name is not compared. Its cells become the centres
     of pixels, scaled when the file was made for another size of the map. ``optimal_cost`` stays
@@ -57,6 +61,16 @@ def load_tasks(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
     Raises:
         MapError: the file cannot be read, is malformed (the message names the line), or has no
             task for this map.
+
+    Example:
+        >>> import tempfile
+        >>> from cbagan_ompl import GridMap
+        >>> with tempfile.NamedTemporaryFile("w", suffix=".csv") as file:
+        ...     _ = file.write("map,start_x,start_y,goal_x,goal_y\nhall,1,2,3,4\n")
+        ...     file.flush()
+        ...     tasks = load_tasks(file.name, GridMap([[1, 1], [1, 1]], name="hall"))
+        >>> tasks[0].goal
+        (3.0, 4.0)
     """
     file = Path(path)
     suffix = file.suffix.lower()
@@ -68,7 +82,7 @@ def load_tasks(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
 
 
 def tasks_of(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
-    """The tasks that come with a map.
+    """Return the tasks that come with a map.
 
     These are those of the package for ``bundled:NAME``, and those in ``NAME.map.scen`` or
     ``NAME.scen`` beside a MovingAI map ``NAME.map``.
@@ -82,6 +96,11 @@ def tasks_of(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
 
     Raises:
         MapError: the task file is malformed.
+
+    Example:
+        >>> from cbagan_ompl import GridMap
+        >>> len(tasks_of("bundled:maze", GridMap.load("bundled:maze")))
+        4
     """
     if str(path).startswith(BUNDLED):
         with resources.as_file(bundled_folder() / "tasks.csv") as file:

@@ -1,55 +1,55 @@
-"""Making a planner of OMPL draw from a heat map, by whichever hook the installed build offers."""
+"""Making a planner of OMPL sample a heat map, by whichever hook the installed build offers."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Any
 
-import numpy as np
-
 from ..errors import PlannerError
-from ..sampling.adaptation import FULL_ADAPTATION, Adaptation, Trust
+from ..sampling.adaptation import AdaptiveMixture
 from ..sampling.heatmap import Heatmap
-from ..sampling.sampler import DEFAULT_UNIFORM_FRACTION, OPTIMIZING_SHARPNESS, HeatmapSampler
-from . import compat
-from . import ompl_samplers as samplers
+from ..sampling.options import OPTIMIZING_SHARPNESS, SamplerOptions
+from ..sampling.sampler import HeatmapSampler
+from . import compat, ompl_samplers
 from .compat import ob, ou
 from .goal_injection import InjectedGoal
 from .hooks import (
     GOAL_INJECTION,
-    KEEP_SAMPLER,
     STATE_SAMPLER,
-    STOP_AT_FIRST,
     VALID_STATE_SAMPLER,
     hook_of,
+    keeps_sampler,
+    stops_at_first,
 )
-from .monitor import PlannerMonitor, is_followed
+from .monitor import PlannerMonitor, is_informed, is_monitored
 from .states import StateAccess, position_bounds, state_access
 
-# OMPL's range of a planner that was given none, as a share of the extent of the space.
+# OMPL's range of a planner that was given none, as a fraction of the extent of the space.
 _OMPL_RANGE = 0.2
-# How far around a node its tree is taken to be, as a share of the range.
+# How far around a node its tree is taken to be, as a fraction of the range.
 _REACH = 0.8
 
 
 class Attachment:
-    """The link between a planner and a heat map; also a context manager that detaches at its end.
+    """What ties a planner to a heat map; also a context manager that detaches at its end.
 
     Attributes:
         hook: name of the hook in use.
+
+    Example: see :func:`attach`, which makes it.
     """
 
-    def __init__(self, hook: str, stream: HeatmapSampler, undo: Callable[[], None]) -> None:
+    def __init__(self, hook: str, sampler: HeatmapSampler, undo: Callable[[], None]) -> None:
         self.hook = hook
-        self._stream = stream
+        self._sampler = sampler
         self._undo: Callable[[], None] | None = undo
 
     @property
     def sample_counts(self) -> dict[str, int]:
-        """Draws that the planner has had so far: ``{"learned": n, "uniform": m}``."""
-        return self._stream.sample_counts
+        """Samples that the planner has had so far: ``{"learned": n, "uniform": m}``."""
+        return self._sampler.sample_counts
 
     def detach(self) -> None:
         """Give the planner back as it was before.
@@ -74,14 +74,9 @@ class Attachment:
 
 
 def attach(
-    setup: Any,
-    heatmap: Heatmap,
-    uniform_fraction: float = DEFAULT_UNIFORM_FRACTION,
-    seed: int | np.random.Generator | None = None,
-    adaptation: Adaptation = FULL_ADAPTATION,
-    sharpness: float | None = None,
+    setup: Any, heatmap: Heatmap, options: SamplerOptions | None = None, **changes: Any
 ) -> Attachment:
-    """Make the planner of a SimpleSetup draw from a heat map.
+    """Make the planner of a SimpleSetup sample a heat map.
 
     Call it after ``setup.setPlanner(...)`` and after the planner's options, the start and the
     goal were set. What the planner has done so far is cleared, because samplers that it has made
@@ -92,51 +87,68 @@ def attach(
 
     Args:
         setup: an ``ompl.geometric.SimpleSetup``.
-        heatmap: where to draw, in the coordinates of the setup's space.
-        uniform_fraction: share of draws that stays uniform over free space, in (0, 1].
-        seed: seed or generator of the draws; seed OMPL as well for repeatable plans.
-        adaptation: how the share of the heat map changes while the planner plans, see
-            :mod:`cbagan_ompl.sampling.adaptation`; for planners that goal injection reaches.
-        sharpness: power of the heat map that the density of the draws is proportional to. By
-            default 1 for planners that stop at their first path, and
-            :data:`cbagan_ompl.sampling.sampler.OPTIMIZING_SHARPNESS` for those that go on.
+        heatmap: what to sample, in the coordinates of the setup's space.
+        options: how samples follow the heat map. ``sharpness`` None stands for 1 with planners that
+            stop at their first path, and for
+            :data:`cbagan_ompl.sampling.options.OPTIMIZING_SHARPNESS` with those that go on.
+            ``adaptation`` is for planners that goal injection reaches. ``seed`` is that of our
+            samples alone; seed OMPL as well for plans that can be repeated.
+        **changes: single fields of :class:`SamplerOptions`, such as ``seed=1``.
 
     Returns:
         A handle with ``.hook``, ``.sample_counts`` and ``.detach()``.
 
     Raises:
-        PlannerError: no planner is set, no hook of this build reaches it, it draws from a heat
-            map already, its space has no (x, y), the start or goal is missing, or the goal
-            cannot be sampled.
+        PlannerError: no planner is set, no hook of this build reaches it, it samples a heat map
+            already, its space has no (x, y), the start or goal is missing, or the goal cannot be
+            sampled.
         HeatmapError: the heat map is 0 everywhere in the bounds of the space.
-        ConfigError: ``uniform_fraction`` outside (0, 1], or a ``sharpness`` that is no finite
-            number above 0.
+        ConfigError: an option that makes no sense, see :class:`SamplerOptions`.
+
+    Example:
+        >>> from ompl import base as ob, geometric as og, util as ou
+        >>> from cbagan_ompl import GridMap, GridValidityChecker, Heatmap, tasks_of
+        >>> from cbagan_ompl.planning.problem import make_setup
+        >>> ou.setLogLevel(ou.LOG_NONE)
+        >>> grid = GridMap.load("bundled:rooms")
+        >>> task = tasks_of("bundled:rooms", grid)[0]
+        >>> setup = make_setup(grid, grid.check_task(task.start, task.goal), tolerance=1.0)
+        >>> setup.setPlanner(og.RRT(setup.getSpaceInformation()))
+        >>> with attach(setup, Heatmap.corridor(grid, task.start, task.goal), seed=0) as attachment:
+        ...     _ = setup.solve(5.0)
+        ...     attachment.hook, attachment.sample_counts["learned"] > 0
+        ('goal-injection', True)
     """
+    options = SamplerOptions.of(options, changes)
     planner = setup.getPlanner()
     _check_attachable(setup, planner)
     name = _class_name(planner)
     hook = hook_of(name)
-    if sharpness is None:
-        sharpness = 1.0 if name in STOP_AT_FIRST else OPTIMIZING_SHARPNESS
-    stream = HeatmapSampler(heatmap, uniform_fraction, seed, sharpness)
+    if options.sharpness is None:
+        sharpness = 1.0 if stops_at_first(name) else OPTIMIZING_SHARPNESS
+        options = replace(options, sharpness=sharpness)
+    rng = options.generator()
     space = setup.getStateSpace()
-    positions = state_access(space, stream.rng)
-    stream.keep_inside(*position_bounds(space))
-    # Samplers and solutions that are there already would keep the planner from asking for draws.
+    states = state_access(space, rng)
+    monitor = PlannerMonitor(setup, states)
+    mixture = None
+    if hook == GOAL_INJECTION:
+        mixture = AdaptiveMixture(heatmap, options.adaptation, _reach_of(planner), monitor)
+    sampler = HeatmapSampler(heatmap, replace(options, seed=rng), monitor, mixture)
+    sampler.keep_inside(*position_bounds(space))
+    # Samplers and solutions that are there already would keep the planner from asking for samples.
     planner.clear()
     setup.getProblemDefinition().clearSolutionPaths()
-    progress = PlannerMonitor(setup, positions)
-    stream.follow(progress.best_cost, progress.informed_set if _is_informed(planner) else None)
-    parts = _Parts(setup, planner, name, positions, stream, progress, adaptation)
-    undo_hook = _INSTALL[hook](parts)
-    stream.prepare()
+    undo_hook = _INSTALL[hook](_Wiring(setup, planner, name, states, sampler, monitor))
+    monitor.register()
+    sampler.prepare()
 
     def undo() -> None:
-        progress.release()
+        monitor.release()
         planner.clear()  # first: a planner without samplers makes none while its options change
         undo_hook()
 
-    return Attachment(hook, stream, undo)
+    return Attachment(hook, sampler, undo)
 
 
 def _check_attachable(setup: Any, planner: Any) -> None:
@@ -149,18 +161,14 @@ def _check_attachable(setup: Any, planner: Any) -> None:
             "attach needs a goal that can be sampled, such as a GoalState or GoalStates, this one "
             f"is a {type(setup.getGoal()).__name__}"
         )
-    if is_followed(planner):
+    if is_monitored(planner):
         raise PlannerError(
-            "this planner draws from a heat map already: call detach() of its attachment first"
+            "this planner samples a heat map already: call detach() of its attachment first"
         )
 
 
-def _is_informed(planner: Any) -> bool:
-    return hasattr(planner, "getInformedSampling") and planner.getInformedSampling()
-
-
 def _class_name(planner: Any) -> str:
-    """OMPL's name of the class, also for Python subclasses of it."""
+    """Return OMPL's name of the class, also for Python subclasses of it."""
     names = compat.planner_names()
     return next(
         (kind.__name__ for kind in type(planner).__mro__ if kind.__name__ in names),
@@ -168,33 +176,38 @@ def _class_name(planner: Any) -> str:
     )
 
 
+def _reach_of(planner: Any) -> float:
+    """Return how far around a node a tree need not grow again, world units: most of its range."""
+    # Before its setup a planner may have no range yet; OMPL then takes a fraction of the space.
+    si = planner.getSpaceInformation()
+    return _REACH * float(planner.getRange() or _OMPL_RANGE * si.getMaximumExtent())
+
+
 @dataclass(frozen=True)
-class _Parts:
+class _Wiring:
     """What the installation of a hook works with."""
 
     setup: Any
     planner: Any
     name: str
-    positions: StateAccess
-    stream: HeatmapSampler
-    progress: PlannerMonitor
-    adaptation: Adaptation
+    states: StateAccess
+    sampler: HeatmapSampler
+    monitor: PlannerMonitor
 
 
-def _use_state_sampler(parts: _Parts) -> Callable[[], None]:
-    space, stream = parts.setup.getStateSpace(), parts.stream
-    planner = parts.planner
-    space.setStateSamplerAllocator(samplers.state_sampler_allocator(stream.heatmap, stream=stream))
-    restore = _reject_uninformed(planner) if _is_informed(planner) else None
-    keeps_sampler = parts.name in KEEP_SAMPLER
-    if keeps_sampler:
+def _use_state_sampler(wiring: _Wiring) -> Callable[[], None]:
+    space, planner = wiring.setup.getStateSpace(), wiring.planner
+    space.setStateSamplerAllocator(ompl_samplers.state_sampler_allocator(wiring.sampler))
+    restore = _reject_uninformed(planner) if is_informed(planner) else None
+    keeps = keeps_sampler(wiring.name)
+    if keeps:
         _renew_sampler(planner)
 
     def undo() -> None:
         space.clearStateSamplerAllocator()
         if restore is not None:
             restore()
-        if keeps_sampler:
+        if keeps:
             _renew_sampler(planner)
 
     return undo
@@ -208,7 +221,7 @@ def _renew_sampler(planner: Any) -> None:
 
 
 def _reject_uninformed(planner: Any) -> Callable[[], None]:
-    """Direct informed sampling makes its own sampler; rejection asks the one that was set."""
+    """Let an informed planner reject samples: direct informed sampling makes its own sampler."""
     informed, rejection = planner.getInformedSampling(), planner.getSampleRejection()
     planner.setInformedSampling(False)
     planner.setSampleRejection(True)
@@ -221,29 +234,19 @@ def _reject_uninformed(planner: Any) -> Callable[[], None]:
     return restore
 
 
-def _use_valid_state_sampler(parts: _Parts) -> Callable[[], None]:
-    si, stream = parts.setup.getSpaceInformation(), parts.stream
-    si.setValidStateSamplerAllocator(
-        samplers.valid_state_sampler_allocator(stream.heatmap, stream=stream)
-    )
+def _use_valid_state_sampler(wiring: _Wiring) -> Callable[[], None]:
+    si = wiring.setup.getSpaceInformation()
+    si.setValidStateSamplerAllocator(ompl_samplers.valid_state_sampler_allocator(wiring.sampler))
     return lambda: compat.clear_valid_state_sampler(si)
 
 
-def _inject_goals(parts: _Parts) -> Callable[[], None]:
-    setup, planner = parts.setup, parts.planner
+def _inject_goals(wiring: _Wiring) -> Callable[[], None]:
+    setup, planner = wiring.setup, wiring.planner
     original, bias = setup.getGoal(), planner.getGoalBias()
     si = setup.getSpaceInformation()
-    trust = Trust(
-        parts.stream.heatmap,
-        parts.adaptation,
-        _reach(planner, si),
-        parts.progress.nodes,
-        parts.progress.set_share,
-    )
-    parts.stream.adapt(trust)
-    injected = InjectedGoal(si, original, parts.positions, parts.stream, parts.progress, trust)
+    injected = InjectedGoal(si, original, wiring.states, wiring.sampler, wiring.monitor)
     setup.setGoal(injected)
-    parts.progress.set_share(1.0)
+    wiring.monitor.set_injected_fraction(1.0)
 
     def undo() -> None:
         if setup.getGoal() is injected:
@@ -251,13 +254,6 @@ def _inject_goals(parts: _Parts) -> Callable[[], None]:
         planner.setGoalBias(bias)
 
     return undo
-
-
-def _reach(planner: Any, si: Any) -> float:
-    """How far around a node a tree need not grow again, world units: most of its longest edge."""
-    # Before its setup a planner may have no range yet; OMPL then takes a share of the space.
-    longest = planner.getRange() or _OMPL_RANGE * si.getMaximumExtent()
-    return _REACH * float(longest)
 
 
 _INSTALL = {

@@ -30,6 +30,8 @@ except ImportError as error:  # pragma: no cover - ompl is a declared dependency
 
 #: True for the Boost.Python bindings of OMPL 1.x.
 BOOST_PYTHON = hasattr(ompl, "dll_loader")
+#: The generation of the bindings: "boost" (OMPL 1.7) or "nanobind" (2.0).
+BINDINGS = "boost" if BOOST_PYTHON else "nanobind"
 if BOOST_PYTHON and not _OMPL_WAS_LOADED:
     # ompl.util preloads a second copy of libompl; its static objects are then destroyed twice,
     # and the interpreter crashes at exit. The first copy is all that is needed.
@@ -40,7 +42,7 @@ from ompl import geometric as og  # noqa: E402
 from ompl import tools as ot  # noqa: E402
 from ompl import util as ou  # noqa: E402
 
-__all__ = ["BOOST_PYTHON", "HAS_STATE_SAMPLER_ALLOCATOR", "ob", "og", "ou"]
+__all__ = ["BINDINGS", "BOOST_PYTHON", "HAS_STATE_SAMPLER_ALLOCATOR", "ob", "og", "ou"]
 
 #: Whether planners can be given a StateSampler (OMPL 1.7; not bound in 2.0.0 and 2.0.1).
 HAS_STATE_SAMPLER_ALLOCATOR = hasattr(ob.StateSpace, "setStateSamplerAllocator")
@@ -52,14 +54,9 @@ _BROKEN = {"AORRTC", "LazyLBTRRT"} | ({"ABITstar", "AITstar", "BITstar"} if BOOS
 # Planners for other spaces than those of a map.
 _OTHER_SPACES = frozenset({"STRRTstar"})
 
-#: Planners that never come back from a solve whose termination condition is a Python function.
-HANGS_ON_PYTHON_TERMINATION = frozenset(
-    {"SPARS", "SPARStwo"} if BOOST_PYTHON else {"PRM", "PRMstar"}
-)
-
 
 def ompl_version() -> str:
-    """Version of the installed OMPL package, or "unknown" for a build without metadata."""
+    """Return the version of the installed OMPL package; "unknown" for a build without metadata."""
     try:
         return version("ompl")
     except PackageNotFoundError:
@@ -83,29 +80,29 @@ if BOOST_PYTHON and _OMPL_WAS_LOADED:
     _skip_static_destructors()
 
 
-def _wrapped(wrapper: str, function: Callable[..., Any], home: Any = ob) -> Any:
-    """Boost.Python wants callbacks in a typed std::function, nanobind takes them as they are."""
+def _wrap(wrapper: str, function: Callable[..., Any], home: Any = ob) -> Any:
+    """Wrap a callback: Boost.Python wants a typed std::function, nanobind takes it as it is."""
     return getattr(home, wrapper)(function) if hasattr(home, wrapper) else function
 
 
 def validity_function(function: Callable[[Any], bool]) -> Any:
-    """What ``setStateValidityChecker`` takes for a Python function."""
-    return _wrapped("StateValidityCheckerFn", function)
+    """Return what ``setStateValidityChecker`` takes for a Python function."""
+    return _wrap("StateValidityCheckerFn", function)
 
 
 def state_sampler_allocator(function: Callable[[Any], Any]) -> Any:
-    """What ``StateSpace.setStateSamplerAllocator`` takes."""
-    return _wrapped("StateSamplerAllocator", function)
+    """Return what ``StateSpace.setStateSamplerAllocator`` takes."""
+    return _wrap("StateSamplerAllocator", function)
 
 
 def valid_state_sampler_allocator(function: Callable[[Any], Any]) -> Any:
-    """What ``SpaceInformation.setValidStateSamplerAllocator`` takes."""
-    return _wrapped("ValidStateSamplerAllocator", function)
+    """Return what ``SpaceInformation.setValidStateSamplerAllocator`` takes."""
+    return _wrap("ValidStateSamplerAllocator", function)
 
 
 def termination_condition(function: Callable[[], bool]) -> Any:
-    """A planner termination condition that asks a Python function."""
-    return ob.PlannerTerminationCondition(_wrapped("PlannerTerminationConditionFn", function))
+    """Return a planner termination condition that asks a Python function."""
+    return ob.PlannerTerminationCondition(_wrap("PlannerTerminationConditionFn", function))
 
 
 def new_benchmark(
@@ -114,15 +111,15 @@ def new_benchmark(
     before_run: Callable[[Any], None],
     after_run: Callable[[Any, Any], None],
 ) -> Any:
-    """An ``ompl.tools.Benchmark`` with its two events around each run."""
+    """Return an ``ompl.tools.Benchmark`` with its two events around each run."""
     benchmark = ot.Benchmark(setup, name)
-    benchmark.setPreRunEvent(_wrapped("PreSetupEvent", before_run, ot))
-    benchmark.setPostRunEvent(_wrapped("PostSetupEvent", after_run, ot))
+    benchmark.setPreRunEvent(_wrap("PreSetupEvent", before_run, ot))
+    benchmark.setPostRunEvent(_wrap("PostSetupEvent", after_run, ot))
     return benchmark
 
 
 def benchmark_request() -> Any:
-    """What ``Benchmark.benchmark`` takes: limits and options, as attributes to set."""
+    """Return what ``Benchmark.benchmark`` takes: limits and options, as attributes to set."""
     return ot.Benchmark.Request() if BOOST_PYTHON else ot.Request()
 
 
@@ -147,7 +144,7 @@ def fill_statistics_database(logs: Sequence[Path], database: Path) -> bool:
 
 
 def plane_space(low: NDArray[np.float64], high: NDArray[np.float64]) -> Any:
-    """A two-dimensional RealVectorStateSpace.
+    """Return a two-dimensional RealVectorStateSpace.
 
     On OMPL 1.x the space of an SE2StateSpace is taken: one made by C++ needs no look-up of Python
     overrides at each distance, which more than doubles the iterations of RRT* per second.
@@ -170,22 +167,25 @@ def plane_space(low: NDArray[np.float64], high: NDArray[np.float64]) -> Any:
 
 
 def new_state(space: Any) -> Any:
-    """A state of the space that lives as long as the returned object."""
+    """Return a state of the space that lives as long as the returned object."""
     return ob.State(space) if BOOST_PYTHON else space.allocState()
 
 
 def best_cost(planner: Any) -> float:
-    """Cost of the best solution of an RRT*-like planner, infinite before the first one."""
+    """Return the cost of an RRT*-like planner's best solution, infinite before the first one."""
     return float(planner.bestCost().value())
 
 
 def typed_state(state: Any) -> Any:
-    """The state as callbacks see it; one made by :func:`new_state` must be kept alive meanwhile."""
+    """Return a state as callbacks see it.
+
+    One made by :func:`new_state` must be kept alive meanwhile.
+    """
     return state() if BOOST_PYTHON and isinstance(state, ob.State) and callable(state) else state
 
 
 def start_states(planner: Any) -> list[Any]:
-    """The start states of a planner that has begun to plan.
+    """Return the start states of a planner that has begun to plan.
 
     On OMPL 2.0 they are read from the planner's tree: ``ProblemDefinition.getStartState`` hands
     out an owning pointer there, which is freed twice.
@@ -206,24 +206,27 @@ def clear_valid_state_sampler(si: Any) -> None:
 
 
 def planner_data(planner: Any) -> Any:
-    """The tree or roadmap of a planner as an ``ob.PlannerData``."""
+    """Return the tree or roadmap of a planner as an ``ob.PlannerData``."""
     data = ob.PlannerData(planner.getSpaceInformation())
     planner.getPlannerData(data)
     return data
 
 
 def is_exact(status: Any) -> bool:
-    """Whether a planner status is an exact solution; its truth value counts approximate ones."""
+    """Return whether a planner status is an exact solution.
+
+    The truth value of a status counts approximate solutions as well.
+    """
     return bool(status.getStatus() == ob.PlannerStatus.EXACT_SOLUTION)
 
 
 def path_positions(path: Any) -> NDArray[np.float64]:
-    """The states of a geometric path in the plane, (N, 2)."""
+    """Return the states of a geometric path in the plane, (N, 2)."""
     return np.array([(state[0], state[1]) for state in path.getStates()])
 
 
 def tree_edges(data: Any) -> NDArray[np.float64]:
-    """The edges in the plane of an ``ob.PlannerData``, (M, 2, 2)."""
+    """Return the edges in the plane of an ``ob.PlannerData``, (M, 2, 2)."""
     count = data.numVertices()
     states = [data.getVertex(i).getState() for i in range(count)]
     points = np.array([(state[0], state[1]) for state in states]).reshape(-1, 2)
@@ -240,7 +243,7 @@ def _edges_from(data: Any, vertex: int) -> list[int]:
 
 
 def planner_class(name: str) -> Any:
-    """The class of a geometric planner by its OMPL name.
+    """Return the class of a geometric planner by its OMPL name.
 
     Raises:
         PlannerError: this build has no such planner.
@@ -255,7 +258,7 @@ def planner_class(name: str) -> Any:
 
 
 def planner_names() -> frozenset[str]:
-    """Names of the geometric planners of this build that can be used on a map.
+    """Return the names of the geometric planners of this build that can be used on a map.
 
     Left out are those that crash the interpreter by themselves, and STRRTstar, which plans in
     space-time only.
@@ -271,7 +274,7 @@ def planner_names() -> frozenset[str]:
 def seed_ompl(seed: int) -> None:
     """Seed OMPL's generators that are made from now on.
 
-    OMPL reports an error when it has drawn numbers before, and reseeds all the same; the report
+    OMPL reports an error when it has sampled before, and reseeds all the same; the report
     is kept quiet.
 
     Args:

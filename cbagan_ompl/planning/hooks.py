@@ -1,79 +1,75 @@
-"""Which planner draws from what, and so by which hook a heat map reaches it on this build."""
+"""Which planner samples from what, and so by which hook a heat map reaches it on this build."""
 
 from __future__ import annotations
 
-from ..errors import PlannerError
-from .compat import HAS_STATE_SAMPLER_ALLOCATOR, ompl_version, planner_names
+from dataclasses import dataclass
 
+from ..errors import PlannerError
+from .compat import BINDINGS, HAS_STATE_SAMPLER_ALLOCATOR, ompl_version, planner_names
+
+#: The planner asks a StateSampler of its space.
 STATE_SAMPLER = "state-sampler"
+#: The planner asks a ValidStateSampler of its space information.
 VALID_STATE_SAMPLER = "valid-state-sampler"
+#: The planner samples its goal with a probability that can be set, and grows its tree towards the
+#: sample. It asks the goal about each new node as well, so that samples can follow the tree.
 GOAL_INJECTION = "goal-injection"
 
-# Planners that make their sampler when they are set up, and keep it for good.
-KEEP_SAMPLER = frozenset({"LazyPRM", "LazyPRMstar"})
 
-# Planners that draw from a StateSampler of the space, but for those that sample their goal as well.
-_DRAW_STATES = KEEP_SAMPLER | {
-    "BFMT",
-    "FMT",
-    "KPIECE1",
-    "LBKPIECE1",
-    "LBTRRT",
-    "LazyRRT",
-    "PDST",
-    "RRTConnect",
-    "RRTXstatic",
-    "RRTsharp",
-    "SST",
-    "TRRT",
+@dataclass(frozen=True)
+class PlannerTraits:
+    """What has to be known of a planner.
+
+    Attributes:
+        hook: what it samples from: :data:`STATE_SAMPLER`, :data:`VALID_STATE_SAMPLER` or
+            :data:`GOAL_INJECTION`.
+        stops_at_first: whether its solve ends with the first path.
+        keeps_sampler: whether it makes its sampler when it is set up and keeps it for good.
+        hangs_with: the bindings, see :data:`.compat.BINDINGS`, with which a solve never returns
+            when its termination condition is a Python function; None for no bindings.
+    """
+
+    hook: str
+    stops_at_first: bool = False
+    keeps_sampler: bool = False
+    hangs_with: str | None = None
+
+
+#: Every planner that some hook reaches on some build, by OMPL's name of its class.
+PLANNERS = {
+    "BFMT": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
+    "BKPIECE1": PlannerTraits(VALID_STATE_SAMPLER, stops_at_first=True),
+    "BiEST": PlannerTraits(VALID_STATE_SAMPLER, stops_at_first=True),
+    "EST": PlannerTraits(VALID_STATE_SAMPLER, stops_at_first=True),
+    "FMT": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
+    "InformedRRTstar": PlannerTraits(GOAL_INJECTION),
+    "KPIECE1": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
+    "LBKPIECE1": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
+    "LBTRRT": PlannerTraits(STATE_SAMPLER),
+    "LazyPRM": PlannerTraits(STATE_SAMPLER, stops_at_first=True, keeps_sampler=True),
+    "LazyPRMstar": PlannerTraits(STATE_SAMPLER, keeps_sampler=True),
+    "LazyRRT": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
+    "PDST": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
+    "PRM": PlannerTraits(VALID_STATE_SAMPLER, stops_at_first=True, hangs_with="nanobind"),
+    "PRMstar": PlannerTraits(VALID_STATE_SAMPLER, hangs_with="nanobind"),
+    "ProjEST": PlannerTraits(VALID_STATE_SAMPLER, stops_at_first=True),
+    "RRT": PlannerTraits(GOAL_INJECTION, stops_at_first=True),
+    "RRTConnect": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
+    "RRTXstatic": PlannerTraits(STATE_SAMPLER),
+    "RRTsharp": PlannerTraits(STATE_SAMPLER),
+    "RRTstar": PlannerTraits(GOAL_INJECTION),
+    "SBL": PlannerTraits(VALID_STATE_SAMPLER, stops_at_first=True),
+    "SORRTstar": PlannerTraits(GOAL_INJECTION),
+    "SPARS": PlannerTraits(VALID_STATE_SAMPLER, hangs_with="boost"),
+    "SPARStwo": PlannerTraits(VALID_STATE_SAMPLER, hangs_with="boost"),
+    "SST": PlannerTraits(STATE_SAMPLER),
+    "STRIDE": PlannerTraits(VALID_STATE_SAMPLER, stops_at_first=True),
+    "TRRT": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
 }
-
-# Planners that draw from a ValidStateSampler of the space information.
-_DRAW_VALID_STATES = frozenset(
-    {
-        "BKPIECE1",
-        "BiEST",
-        "EST",
-        "PRM",
-        "PRMstar",
-        "ProjEST",
-        "SBL",
-        "SPARS",
-        "SPARStwo",
-        "STRIDE",
-    }
-)
-
-# Planners that grow their tree towards samples of the goal with a settable probability. They ask
-# the goal about every node of their tree as well, so that draws can follow what the tree does.
-_SAMPLE_GOAL = frozenset({"InformedRRTstar", "RRT", "RRTstar", "SORRTstar"})
-
-#: Planners whose solve ends with the first solution.
-STOP_AT_FIRST = frozenset(
-    {
-        "BFMT",
-        "BKPIECE1",
-        "BiEST",
-        "EST",
-        "FMT",
-        "KPIECE1",
-        "LBKPIECE1",
-        "LazyPRM",
-        "LazyRRT",
-        "PDST",
-        "PRM",
-        "ProjEST",
-        "RRT",
-        "RRTConnect",
-        "SBL",
-        "STRIDE",
-        "TRRT",
-    }
-)
 
 
 def hook_of(planner: str) -> str:
-    """Name of the hook that reaches a planner on the installed OMPL.
+    """Return the name of the hook that reaches a planner on the installed OMPL.
 
     Args:
         planner: OMPL's name of its class, such as ``"RRTstar"``.
@@ -81,30 +77,49 @@ def hook_of(planner: str) -> str:
     Raises:
         PlannerError: no hook of this build reaches it; the message says what would.
     """
-    if planner in _DRAW_VALID_STATES:
-        return VALID_STATE_SAMPLER
-    if planner in _SAMPLE_GOAL:
-        return GOAL_INJECTION
-    if planner in _DRAW_STATES and HAS_STATE_SAMPLER_ALLOCATOR:
-        return STATE_SAMPLER
-    if planner in _DRAW_STATES:
+    traits = PLANNERS.get(planner)
+    if traits is None:
         raise PlannerError(
-            f"{planner} draws from a StateSampler, which OMPL {ompl_version()} does not let "
-            "Python set: it needs a build that binds StateSpace.setStateSamplerAllocator, such "
-            f"as ompl 1.7.0. {_reached()}"
+            f"no hook reaches {planner}: its samplers are made inside OMPL. {_list_reached()}"
         )
-    raise PlannerError(
-        f"no hook reaches {planner}: its samplers are made inside OMPL. {_reached()}"
-    )
+    if traits.hook == STATE_SAMPLER and not HAS_STATE_SAMPLER_ALLOCATOR:
+        raise PlannerError(
+            f"{planner} samples from a StateSampler, which OMPL {ompl_version()} does not let "
+            "Python set: it needs a build that binds StateSpace.setStateSamplerAllocator, such "
+            f"as ompl 1.7.0. {_list_reached()}"
+        )
+    return traits.hook
 
 
 def reached_planners() -> dict[str, str]:
-    """The planners of the installed OMPL that a hook reaches, each with the hook's name."""
-    reachable = _DRAW_VALID_STATES | _SAMPLE_GOAL
-    if HAS_STATE_SAMPLER_ALLOCATOR:
-        reachable |= _DRAW_STATES
-    return {name: hook_of(name) for name in sorted(reachable & planner_names())}
+    """Return the planners of the installed OMPL that a hook reaches, each with the hook's name.
+
+    Example:
+        >>> reached_planners()["RRTstar"]
+        'goal-injection'
+    """
+    hooks = {name: PLANNERS[name].hook for name in sorted(planner_names() & PLANNERS.keys())}
+    return {
+        name: hook
+        for name, hook in hooks.items()
+        if hook != STATE_SAMPLER or HAS_STATE_SAMPLER_ALLOCATOR
+    }
 
 
-def _reached() -> str:
+def stops_at_first(planner: str) -> bool:
+    """Return whether the solve of a planner ends with its first path."""
+    return planner in PLANNERS and PLANNERS[planner].stops_at_first
+
+
+def keeps_sampler(planner: str) -> bool:
+    """Return whether a planner makes its sampler when it is set up and keeps it for good."""
+    return planner in PLANNERS and PLANNERS[planner].keeps_sampler
+
+
+def hangs_on_python_termination(planner: str) -> bool:
+    """Return whether a solve with a termination condition in Python never returns."""
+    return planner in PLANNERS and PLANNERS[planner].hangs_with == BINDINGS
+
+
+def _list_reached() -> str:
     return f"Reached here: {', '.join(reached_planners())}"

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..sampling.heatmap import Heatmap
-from ..sampling.sampler import InformedSet
+from ..sampling.informed_set import InformedSet
 from .compat import best_cost, new_state, ob, planner_data, start_states, typed_state
 from .states import StateAccess
 
@@ -27,25 +27,25 @@ class PlannerMonitor:
     reports every object that is left.
 
     Attributes:
-        share: of the planner's draws, those that it asks the goal for.
+        injected_fraction: fraction of the planner's samples that it asks the goal for.
 
     Args:
         setup: a SimpleSetup with its planner and its own goal.
-        positions: access to the positions of its states.
+        states: access to the positions of its states.
     """
 
-    def __init__(self, setup: Any, positions: StateAccess) -> None:
+    def __init__(self, setup: Any, states: StateAccess) -> None:
         self._planner = setup.getPlanner()
         self._problem = setup.getProblemDefinition()
         self._goal = setup.getGoal()
-        self._positions = positions
+        self._states = states
+        self._is_informed = is_informed(self._planner)
         self._counts_iterations = hasattr(self._planner, "numIterations")
         self._last_iteration = self._asked_iteration = self._paths = 0
-        self.share = 1.0
-        _alive.add(self)
+        self.injected_fraction = 1.0
 
     def is_sampling(self) -> bool:
-        """Whether the planner's main loop is asking for a goal, rather than OMPL around it.
+        """Return whether the planner's main loop asks for a goal, rather than OMPL around it.
 
         An informed sampler that is being built, and the path simplifier, ask the goal for samples
         as well, and must get the goal itself. RRT*-like planners count iterations, ask how many
@@ -75,55 +75,61 @@ class PlannerMonitor:
         return self.best_cost() < inf
 
     def best_cost(self) -> float:
-        """Cost of the best solution, infinite before there is one.
+        """Return the cost of the best solution, infinite before there is one.
 
-        Always infinite for planners that do not tell it; they stop at their first solution.
+        It is always infinite for planners that do not tell it; they stop at their first solution.
         """
         if self._planner is None or not self._counts_iterations:
             return inf
         return best_cost(self._planner)
 
     def informed_set(self) -> InformedSet | None:
-        """The informed set of the task, once the planner has begun to plan.
+        """Return the informed set of the task, once the planner has begun to plan.
 
-        None where costs are no path lengths.
+        It is None for planners that are not informed, and where costs are no path lengths.
         """
         objective = self._problem.getOptimizationObjective()
         is_length = isinstance(objective, ob.PathLengthOptimizationObjective)
-        return self._ends() if is_length else None
-
-    def _ends(self) -> InformedSet:
-        state = new_state(self._planner.getSpaceInformation().getStateSpace())
-        typed = typed_state(state)
-        goals = []
-        for _ in range(min(self._goal.maxSampleCount(), _MAX_GOALS)):
-            self._goal.sampleGoal(typed)
-            goals.append(self._positions.read(typed))
-        starts = [self._positions.read(start) for start in start_states(self._planner)]
-        return InformedSet(np.array(starts), np.array(goals), self._goal.getThreshold())
+        return self._endpoints() if self._is_informed and is_length else None
 
     def connects(self, heatmap: Heatmap) -> bool:
-        """Whether a region joins a start with a goal, once the planner has begun to plan."""
-        ends = self._ends()
-        return any(heatmap.connects(start, goal) for start in ends.starts for goal in ends.goals)
+        """Return whether a region connects a start with a goal, once planning has begun."""
+        endpoints = self._endpoints()
+        return any(
+            heatmap.connects(start, goal) for start in endpoints.starts for goal in endpoints.goals
+        )
 
-    def nodes(self) -> int:
-        """Number of nodes of the tree."""
+    def node_count(self) -> int:
+        """Return the number of nodes of the tree."""
         return 0 if self._planner is None else int(planner_data(self._planner).numVertices())
 
-    def set_share(self, share: float) -> None:
-        """Leave all but a share of the draws to the planner's own sampler."""
-        self.share = share
+    def set_injected_fraction(self, fraction: float) -> None:
+        """Leave all but a fraction of the samples to the planner's own sampler."""
+        self.injected_fraction = fraction
         if self._planner is not None:
-            self._planner.setGoalBias(share)
+            self._planner.setGoalBias(fraction)
+
+    def register(self) -> None:
+        """Let :func:`is_monitored` and the interpreter's exit know of this monitor."""
+        _alive.add(self)
 
     def refers_to(self, planner: Any) -> bool:
-        """Whether this is the progress of a planner."""
+        """Return whether this is the monitor of a planner."""
         return self._planner is planner
 
     def release(self) -> None:
         """Let go of the planner and its task."""
         self._planner = self._problem = self._goal = None
+
+    def _endpoints(self) -> InformedSet:
+        state = new_state(self._planner.getSpaceInformation().getStateSpace())
+        typed = typed_state(state)
+        goals = []
+        for _ in range(min(self._goal.maxSampleCount(), _MAX_GOALS)):
+            self._goal.sampleGoal(typed)
+            goals.append(self._states.read(typed))
+        starts = [self._states.read(start) for start in start_states(self._planner)]
+        return InformedSet(np.array(starts), np.array(goals), self._goal.getThreshold())
 
 
 class CostHistory:
@@ -144,7 +150,7 @@ class CostHistory:
         self._began = perf_counter()
 
     def look(self) -> float:
-        """Note the best cost if it is a better one; seconds since the history began."""
+        """Note the best cost if it is a better one; return the seconds since the history began."""
         elapsed = perf_counter() - self._began
         if self._planner is not None and (cost := best_cost(self._planner)) < self._best:
             self._best = cost
@@ -152,9 +158,14 @@ class CostHistory:
         return elapsed
 
 
-def is_followed(planner: Any) -> bool:
-    """Whether callbacks refer to a planner at the moment."""
-    return any(progress.refers_to(planner) for progress in _alive)
+def is_informed(planner: Any) -> bool:
+    """Return whether a planner samples the informed set once it has a path."""
+    return bool(hasattr(planner, "getInformedSampling") and planner.getInformedSampling())
+
+
+def is_monitored(planner: Any) -> bool:
+    """Return whether callbacks refer to a planner at the moment."""
+    return any(monitor.refers_to(planner) for monitor in _alive)
 
 
 _alive: weakref.WeakSet[PlannerMonitor] = weakref.WeakSet()
@@ -162,5 +173,5 @@ _alive: weakref.WeakSet[PlannerMonitor] = weakref.WeakSet()
 
 @atexit.register
 def _release_all() -> None:
-    for progress in list(_alive):
-        progress.release()
+    for monitor in list(_alive):
+        monitor.release()

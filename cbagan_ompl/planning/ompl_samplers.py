@@ -1,14 +1,14 @@
-"""OMPL samplers that draw from a heat map, and the allocators that OMPL's setters take."""
+"""OMPL samplers that sample a heat map, and the allocators that OMPL's setters take."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
+from ..errors import ConfigError
 from ..sampling.heatmap import Heatmap
-from ..sampling.sampler import DEFAULT_UNIFORM_FRACTION, HeatmapSampler
+from ..sampling.options import SamplerOptions
+from ..sampling.sampler import HeatmapSampler
 from . import compat
 from .compat import ob, typed_state
 from .states import position_bounds, state_access
@@ -19,144 +19,166 @@ class HeatmapStateSampler(ob.StateSampler):  # type: ignore[misc]
 
     Args:
         space: RealVectorStateSpace(2), SE2StateSpace, DubinsStateSpace or ReedsSheppStateSpace.
-        heatmap: where to draw.
-        uniform_fraction: share of draws that stays uniform over free space, in (0, 1].
-        seed: seed or generator; the same seed gives the same draws.
-        stream: draws to share with other samplers; ``heatmap``, ``uniform_fraction`` and ``seed``
-            are then those that it was made with.
+        heatmap: what to sample; or a :class:`HeatmapSampler`, to share it with other samplers.
+        options: how samples follow the heat map; ``sharpness`` None stands for 1.
+        **changes: single fields of :class:`SamplerOptions`, such as ``seed=1``.
 
     Raises:
-        ConfigError: ``uniform_fraction`` outside (0, 1].
+        ConfigError: an option that makes no sense, or options beside a :class:`HeatmapSampler`,
+            which has its own.
         PlannerError: the states of the space have no (x, y).
+
+    Example:
+        >>> from ompl import base as ob
+        >>> from cbagan_ompl import GridMap, Heatmap
+        >>> space = ob.RealVectorStateSpace(2)
+        >>> space.setBounds(0, 256)
+        >>> grid = GridMap.load("bundled:rooms")
+        >>> sampler = HeatmapStateSampler(space, Heatmap.uniform(grid), seed=0)
+        >>> sampler.sample_counts
+        {'learned': 0, 'uniform': 0}
     """
 
     def __init__(
         self,
         space: Any,
-        heatmap: Heatmap,
-        uniform_fraction: float = DEFAULT_UNIFORM_FRACTION,
-        seed: int | np.random.Generator | None = None,
-        *,
-        stream: HeatmapSampler | None = None,
+        heatmap: Heatmap | HeatmapSampler,
+        options: SamplerOptions | None = None,
+        **changes: Any,
     ) -> None:
         super().__init__(space)
-        self._stream = stream or HeatmapSampler(heatmap, uniform_fraction, seed)
-        self._positions = state_access(space, self._stream.rng)
-        self._stream.keep_inside(*position_bounds(space))
+        self._sampler = _heatmap_sampler(heatmap, options, changes)
+        self._states = state_access(space, self._sampler.rng)
+        self._sampler.keep_inside(*position_bounds(space))
 
     @property
     def sample_counts(self) -> dict[str, int]:
-        """Draws so far: ``{"learned": n, "uniform": m}``."""
-        return self._stream.sample_counts
+        """Samples so far: ``{"learned": n, "uniform": m}``."""
+        return self._sampler.sample_counts
 
     def sampleUniform(self, state: Any) -> None:  # noqa: N802
-        """Draw from the heat map mixed with uniform: what planners take for "uniform"."""
-        self._positions.write(typed_state(state), *self._stream.next())
+        """Sample the heat map mixed with uniform: what planners take for "uniform"."""
+        self._states.write(typed_state(state), *self._sampler.next())
 
     def sampleUniformNear(self, state: Any, near: Any, distance: float) -> None:  # noqa: N802
-        """Draw from the heat map inside the box of half width ``distance`` around ``near``."""
-        x, y = self._positions.read(typed_state(near))
-        self._positions.write(typed_state(state), *self._stream.near(x, y, distance))
+        """Sample the heat map inside the box of half width ``distance`` around ``near``."""
+        x, y = self._states.read(typed_state(near))
+        self._states.write(typed_state(state), *self._sampler.near(x, y, distance))
 
     def sampleGaussian(self, state: Any, mean: Any, std_dev: float) -> None:  # noqa: N802
-        """Draw from the product of the heat map and a Gaussian around ``mean``."""
-        x, y = self._positions.read(typed_state(mean))
-        self._positions.write(typed_state(state), *self._stream.gaussian(x, y, std_dev))
+        """Sample the product of the heat map and a Gaussian around ``mean``."""
+        x, y = self._states.read(typed_state(mean))
+        self._states.write(typed_state(state), *self._sampler.gaussian(x, y, std_dev))
 
 
 class HeatmapValidStateSampler(ob.ValidStateSampler):  # type: ignore[misc]
     """A valid-state sampler whose positions come from a heat map; headings are uniform.
 
-    Draws are checked with the space information's own validity checker, up to
+    Samples are checked with the space information's own validity checker, up to
     ``getNrAttempts()`` times (100 unless set), as OMPL's UniformValidStateSampler does.
 
     Args:
         si: the space information; its space as for :class:`HeatmapStateSampler`.
-        heatmap: where to draw.
-        uniform_fraction: share of draws that stays uniform over free space, in (0, 1].
-        seed: seed or generator; the same seed gives the same draws.
-        stream: draws to share with other samplers; ``heatmap``, ``uniform_fraction`` and ``seed``
-            are then those that it was made with.
+        heatmap: what to sample; or a :class:`HeatmapSampler`, to share it with other samplers.
+        options: how samples follow the heat map; ``sharpness`` None stands for 1.
+        **changes: single fields of :class:`SamplerOptions`, such as ``seed=1``.
 
     Raises:
-        ConfigError: ``uniform_fraction`` outside (0, 1].
+        ConfigError: an option that makes no sense, or options beside a :class:`HeatmapSampler`,
+            which has its own.
         PlannerError: the states of the space have no (x, y).
+
+    Example:
+        >>> from ompl import base as ob
+        >>> from cbagan_ompl import GridMap, GridValidityChecker, Heatmap
+        >>> space = ob.RealVectorStateSpace(2)
+        >>> space.setBounds(0, 256)
+        >>> si = ob.SpaceInformation(space)
+        >>> grid = GridMap.load("bundled:rooms")
+        >>> si.setStateValidityChecker(GridValidityChecker(si, grid))
+        >>> sampler = HeatmapValidStateSampler(si, Heatmap.uniform(grid), seed=0)
+        >>> sampler.sample_counts
+        {'learned': 0, 'uniform': 0}
     """
 
     def __init__(
         self,
         si: Any,
-        heatmap: Heatmap,
-        uniform_fraction: float = DEFAULT_UNIFORM_FRACTION,
-        seed: int | np.random.Generator | None = None,
-        *,
-        stream: HeatmapSampler | None = None,
+        heatmap: Heatmap | HeatmapSampler,
+        options: SamplerOptions | None = None,
+        **changes: Any,
     ) -> None:
         super().__init__(si)
         self._si = si
-        self._stream = stream or HeatmapSampler(heatmap, uniform_fraction, seed)
+        self._sampler = _heatmap_sampler(heatmap, options, changes)
         space = si.getStateSpace()
-        self._positions = state_access(space, self._stream.rng)
-        self._stream.keep_inside(*position_bounds(space))
+        self._states = state_access(space, self._sampler.rng)
+        self._sampler.keep_inside(*position_bounds(space))
 
     @property
     def sample_counts(self) -> dict[str, int]:
-        """Draws so far: ``{"learned": n, "uniform": m}``."""
-        return self._stream.sample_counts
+        """Samples so far: ``{"learned": n, "uniform": m}``."""
+        return self._sampler.sample_counts
 
     def sample(self, state: Any) -> bool:
-        """Draw a valid state; False when no attempt gave one."""
-        return self._first_valid(state, self._stream.next)
+        """Sample a valid state; return False when no attempt gave one."""
+        return self._sample_valid(state, self._sampler.next)
 
     def sampleNear(self, state: Any, near: Any, distance: float) -> bool:  # noqa: N802
-        """Draw a valid state in the box of half width ``distance`` around ``near``."""
-        x, y = self._positions.read(typed_state(near))
-        return self._first_valid(state, lambda: self._stream.near(x, y, distance))
+        """Sample a valid state in the box of half width ``distance`` around ``near``."""
+        x, y = self._states.read(typed_state(near))
+        return self._sample_valid(state, lambda: self._sampler.near(x, y, distance))
 
-    def _first_valid(self, state: Any, draw: Callable[[], tuple[float, float]]) -> bool:
+    def _sample_valid(self, state: Any, sample: Callable[[], tuple[float, float]]) -> bool:
         typed = typed_state(state)
         for _ in range(self.getNrAttempts()):
-            self._positions.write(typed, *draw())
+            self._states.write(typed, *sample())
             if self._si.isValid(typed):
                 return True
         return False
 
 
 def state_sampler_allocator(
-    heatmap: Heatmap,
-    uniform_fraction: float = DEFAULT_UNIFORM_FRACTION,
-    seed: int | np.random.Generator | None = None,
-    *,
-    stream: HeatmapSampler | None = None,
+    heatmap: Heatmap | HeatmapSampler, options: SamplerOptions | None = None, **changes: Any
 ) -> Any:
-    """What ``StateSpace.setStateSamplerAllocator`` takes, for builds that bind it (OMPL 1.7).
+    """Return what ``StateSpace.setStateSamplerAllocator`` takes, on builds that bind it (OMPL 1.7).
 
-    All samplers that it makes share one stream of draws. Arguments as for
+    All samplers that it makes share one :class:`HeatmapSampler`. Arguments and errors as for
     :class:`HeatmapStateSampler`.
+
+    Example:
+        >>> from cbagan_ompl import GridMap, Heatmap
+        >>> heatmap = Heatmap.uniform(GridMap.load("bundled:rooms"))
+        >>> allocator = state_sampler_allocator(heatmap, seed=0)
     """
-    shared = stream or HeatmapSampler(heatmap, uniform_fraction, seed)
-
-    def allocate(space: Any) -> HeatmapStateSampler:
-        return HeatmapStateSampler(space, shared.heatmap, stream=shared)
-
-    return compat.state_sampler_allocator(allocate)
+    shared = _heatmap_sampler(heatmap, options, changes)
+    return compat.state_sampler_allocator(lambda space: HeatmapStateSampler(space, shared))
 
 
 def valid_state_sampler_allocator(
-    heatmap: Heatmap,
-    uniform_fraction: float = DEFAULT_UNIFORM_FRACTION,
-    seed: int | np.random.Generator | None = None,
-    *,
-    stream: HeatmapSampler | None = None,
+    heatmap: Heatmap | HeatmapSampler, options: SamplerOptions | None = None, **changes: Any
 ) -> Any:
-    """What ``SpaceInformation.setValidStateSamplerAllocator`` takes.
+    """Return what ``SpaceInformation.setValidStateSamplerAllocator`` takes.
 
-    All samplers that it makes share one stream of draws. Arguments as for
+    All samplers that it makes share one :class:`HeatmapSampler`. Arguments and errors as for
     :class:`HeatmapValidStateSampler`.
+
+    Example:
+        >>> from cbagan_ompl import GridMap, Heatmap
+        >>> heatmap = Heatmap.uniform(GridMap.load("bundled:rooms"))
+        >>> allocator = valid_state_sampler_allocator(heatmap, seed=0)
     """
-    shared = stream or HeatmapSampler(heatmap, uniform_fraction, seed)
+    shared = _heatmap_sampler(heatmap, options, changes)
+    return compat.valid_state_sampler_allocator(lambda si: HeatmapValidStateSampler(si, shared))
 
-    def allocate(si: Any) -> HeatmapValidStateSampler:
-        return HeatmapValidStateSampler(si, shared.heatmap, stream=shared)
 
-    return compat.valid_state_sampler_allocator(allocate)
+def _heatmap_sampler(
+    heatmap: Heatmap | HeatmapSampler, options: SamplerOptions | None, changes: dict[str, Any]
+) -> HeatmapSampler:
+    if not isinstance(heatmap, HeatmapSampler):
+        return HeatmapSampler(heatmap, options, **changes)
+    if options is not None or changes:
+        raise ConfigError(
+            "a HeatmapSampler has its own options: give them to it, or give a heat map here"
+        )
+    return heatmap

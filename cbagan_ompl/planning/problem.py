@@ -27,12 +27,12 @@ _NO_PARAMETERS = frozenset(
 _ROUNDING = 1e-9
 
 
-def simple_setup(grid: GridMap, task: Endpoints, tolerance: float) -> Any:
-    """A SimpleSetup with exact checks, start and goal, but no planner.
+def make_setup(grid: GridMap, endpoints: Endpoints, tolerance: float) -> Any:
+    """Return a SimpleSetup with exact checks, start and goal, but no planner.
 
     Args:
         grid: the map.
-        task: start and goal, as from :meth:`GridMap.check_task`.
+        endpoints: start and goal, as from :meth:`GridMap.check_task`.
         tolerance: how far from the goal a path may end, world units.
     """
     space = compat.plane_space(*grid.bounds)
@@ -41,7 +41,7 @@ def simple_setup(grid: GridMap, task: Endpoints, tolerance: float) -> Any:
     setup.setStateValidityChecker(GridValidityChecker(si, grid))
     si.setMotionValidator(GridMotionValidator(si, grid))
     start, goal = compat.new_state(space), compat.new_state(space)
-    for state, point in ((start, task[0]), (goal, task[1])):
+    for state, point in ((start, endpoints[0]), (goal, endpoints[1])):
         state[0], state[1] = float(point[0]), float(point[1])
     # A goal is reached at less than its threshold; OMPL's own default is the least one as well.
     setup.setStartAndGoalStates(start, goal, max(float(tolerance), _LEAST_THRESHOLD))
@@ -90,15 +90,15 @@ def set_parameter(planner: Any, name: str, value: bool | float | str) -> None:
 
 
 def checked_path(
-    setup: Any, grid: GridMap, task: Endpoints, tolerance: float
+    setup: Any, grid: GridMap, endpoints: Endpoints, tolerance: float
 ) -> NDArray[np.float64] | None:
-    """The path that a setup has, or None when it is no path of the task after all."""
+    """Return the path that a setup has, (N, 2); None when it is no path of the task after all."""
     path = compat.path_positions(setup.getSolutionPath())
-    starts = np.array_equal(path[0], task[0])
-    ends = np.hypot(*(path[-1] - task[1])) <= tolerance + _ROUNDING
+    starts = np.array_equal(path[0], endpoints[0])
+    ends = np.hypot(*(path[-1] - endpoints[1])) <= tolerance + _ROUNDING
     return path if starts and ends and grid.path_is_free(path) else None
 
 
 def path_length(path: NDArray[np.float64]) -> float:
-    """Length of a path, (N, 2)."""
+    """Return the length of a path, (N, 2), world units."""
     return float(np.hypot(*np.diff(path, axis=0).T).sum())

@@ -16,18 +16,18 @@ class StateAccess(Protocol):
     """Access to the position in the states of one kind of space."""
 
     def read(self, state: Any) -> tuple[float, float]:
-        """(x, y) of a state."""
+        """Return the (x, y) of a state."""
 
     def write(self, state: Any, x: float, y: float) -> None:
-        """Set the position of a state to a draw; anything else in the state becomes uniform."""
+        """Set the position of a state to a sample; anything else in the state becomes uniform."""
 
 
 class PlaneStateAccess:
-    """States of a RealVectorStateSpace of dimension 2."""
+    """Access to states of a RealVectorStateSpace of dimension 2."""
 
     @staticmethod
     def read(state: Any) -> tuple[float, float]:
-        """(x, y) of a state."""
+        """Return the (x, y) of a state."""
         return state[0], state[1]
 
     @staticmethod
@@ -38,10 +38,10 @@ class PlaneStateAccess:
 
 
 class PoseStateAccess:
-    """States of SE2StateSpace and its Dubins and Reeds-Shepp subclasses: the heading is uniform.
+    """Access to states of SE2StateSpace, DubinsStateSpace and ReedsSheppStateSpace.
 
     Args:
-        seed: seed or generator of the headings.
+        seed: seed or generator of the headings, which are uniform.
     """
 
     def __init__(self, seed: int | np.random.Generator | None = None) -> None:
@@ -49,18 +49,18 @@ class PoseStateAccess:
 
     @staticmethod
     def read(state: Any) -> tuple[float, float]:
-        """(x, y) of a state."""
+        """Return the (x, y) of a state."""
         return state.getX(), state.getY()
 
     def write(self, state: Any, x: float, y: float) -> None:
-        """Set (x, y) and draw a heading."""
+        """Set (x, y) and sample a heading."""
         state.setX(x)
         state.setY(y)
         state.setYaw(float(self._rng.uniform(-pi, pi)))
 
 
 def state_access(space: Any, seed: int | np.random.Generator | None = None) -> StateAccess:
-    """The access that fits a state space.
+    """Return the access that fits a state space.
 
     Args:
         space: an OMPL state space.
@@ -80,6 +80,10 @@ def state_access(space: Any, seed: int | np.random.Generator | None = None) -> S
 
 
 def position_bounds(space: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Lower and upper bounds of the positions in a space that :func:`state_access` serves."""
+    """Return the lower and upper bounds of positions in a space, (2,) each, world.
+
+    Args:
+        space: one that :func:`state_access` serves.
+    """
     bounds = space.getBounds()
     return np.array(list(bounds.low)[:2]), np.array(list(bounds.high)[:2])

@@ -17,14 +17,20 @@ _LAST_VALID_PRECISION = 1e-3
 class GridValidityChecker(ob.StateValidityChecker):  # type: ignore[misc]
     """A state is valid when the pixel that its (x, y) lies in is free.
 
-    Use: ``setup.setStateValidityChecker(GridValidityChecker(setup.getSpaceInformation(), grid))``.
-
     Args:
         si: the space information.
         grid: the map; inflate it first for a robot with a radius.
 
     Raises:
         PlannerError: the states of the space have no (x, y).
+
+    Example:
+        >>> from ompl import base as ob
+        >>> from cbagan_ompl import GridMap
+        >>> space = ob.RealVectorStateSpace(2)
+        >>> space.setBounds(0, 256)
+        >>> si = ob.SpaceInformation(space)
+        >>> si.setStateValidityChecker(GridValidityChecker(si, GridMap.load("bundled:rooms")))
     """
 
     def __init__(self, si: Any, grid: GridMap) -> None:
@@ -34,7 +40,7 @@ class GridValidityChecker(ob.StateValidityChecker):  # type: ignore[misc]
         self._affine = tuple(grid.pixel_from_world)
 
     def isValid(self, state: Any) -> bool:  # noqa: N802
-        """OMPL's question; the answer is a real ``bool``, as OMPL 2.0 demands."""
+        """Return whether a state is valid: a real ``bool``, as OMPL 2.0 demands."""
         x, y = self._read(state)
         a, b, c, d, e, f = self._affine
         u = a * x + b * y + c
@@ -53,25 +59,31 @@ class GridMotionValidator(ob.MotionValidator):  # type: ignore[misc]
     not for Dubins and Reeds-Shepp curves, where OMPL's own validator with a
     :class:`GridValidityChecker` is the one to use.
 
-    Use: ``si.setMotionValidator(GridMotionValidator(si, grid))``.
-
     Args:
         si: the space information.
         grid: the map; inflate it first for a robot with a radius.
 
     Raises:
         PlannerError: the states of the space have no (x, y), or motions are not straight.
+
+    Example:
+        >>> from ompl import base as ob
+        >>> from cbagan_ompl import GridMap
+        >>> space = ob.RealVectorStateSpace(2)
+        >>> space.setBounds(0, 256)
+        >>> si = ob.SpaceInformation(space)
+        >>> si.setMotionValidator(GridMotionValidator(si, GridMap.load("bundled:rooms")))
     """
 
     def __init__(self, si: Any, grid: GridMap) -> None:
         super().__init__(si)
         self._space = si.getStateSpace()
-        self._read = _straight_positions(self._space).read
+        self._read = _straight_state_access(self._space).read
         self._cells, self._width, self._height = grid.cells, grid.width, grid.height
         self._affine = tuple(grid.pixel_from_world)
 
     def checkMotion(self, s1: Any, s2: Any, *last_valid: Any) -> bool:  # noqa: N802
-        """OMPL's question; the answer is a real ``bool``.
+        """Return whether a motion is valid, as a real ``bool``.
 
         Args:
             s1: where the motion begins, a valid state.
@@ -83,16 +95,16 @@ class GridMotionValidator(ob.MotionValidator):  # type: ignore[misc]
         x0, y0 = self._read(s1)
         x1, y1 = self._read(s2)
         a, b, c, d, e, f = self._affine
-        ends = a * x0 + b * y0 + c, d * x0 + e * y0 + f, a * x1 + b * y1 + c, d * x1 + e * y1 + f
-        free = segment_is_free(self._cells, self._width, self._height, *ends)
+        segment = a * x0 + b * y0 + c, d * x0 + e * y0 + f, a * x1 + b * y1 + c, d * x1 + e * y1 + f
+        free = segment_is_free(self._cells, self._width, self._height, *segment)
         if last_valid and not free:
-            self._set_last_valid(last_valid[0], s1, s2, ends)
+            self._set_last_valid(last_valid[0], s1, s2, segment)
         return free
 
     def _set_last_valid(
-        self, last_valid: Any, s1: Any, s2: Any, ends: tuple[float, float, float, float]
+        self, last_valid: Any, s1: Any, s2: Any, segment: tuple[float, float, float, float]
     ) -> None:
-        u0, v0, u1, v1 = ends
+        u0, v0, u1, v1 = segment
         low, high = 0.0, 1.0
         while high - low > _LAST_VALID_PRECISION:
             middle = (low + high) / 2
@@ -106,7 +118,7 @@ class GridMotionValidator(ob.MotionValidator):  # type: ignore[misc]
             self._space.interpolate(s1, s2, low, last_valid.first)
 
 
-def _straight_positions(space: Any) -> StateAccess:
+def _straight_state_access(space: Any) -> StateAccess:
     if isinstance(space, ob.DubinsStateSpace | ob.ReedsSheppStateSpace):
         raise PlannerError(
             f"GridMotionValidator checks straight motions, those of {type(space).__name__} are "

@@ -12,23 +12,24 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import HeatmapError
+from ..maps.connectivity import label_components
 from ..maps.grid_map import GridMap
 from ..maps.grid_search import pull_taut, shortest_path
 
 #: A pixel whose value is at least this belongs to the promising region.
 REGION_THRESHOLD = 0.5
 
-# Half widths of painted paths, as a share of the map's longer side: the corridor is where a
-# planner should look, the bridge only joins parts of a region and is kept narrow.
-_CORRIDOR_SHARE = 0.03
-_BRIDGE_SHARE = 0.015
+# Half widths of painted paths, as a fraction of the map's longer side: the corridor is where a
+# planner should look, the bridge only connects parts of a region and is kept narrow.
+_CORRIDOR_FRACTION = 0.03
+_BRIDGE_FRACTION = 0.015
 _MIN_HALF_WIDTH = 2.0
 
 # Longest side of the coarse grid in which bridges are looked for.
-_REPAIR_SIDE = 64
+_REPAIR_SIZE = 64
 
-# Price of a pixel length inside the region, relative to one where the heat map is 0.
-_REGION_PRICE = 0.02
+# Cost of a pixel length inside the region, relative to one where the heat map is 0.
+_REGION_COST = 0.02
 
 
 class Heatmap:
@@ -47,6 +48,13 @@ class Heatmap:
     Raises:
         HeatmapError: wrong shape or type, NaN, infinite or negative values, values above 1, or
             nothing above 0 on free space.
+
+    Example:
+        >>> heatmap = Heatmap([[0.2, 0.8], [1.0, 0.0]], GridMap([[1, 1], [1, 0]]))
+        >>> heatmap.region.tolist()
+        [[False, True], [True, False]]
+        >>> heatmap.sample(3, rng=0).shape
+        (3, 2)
     """
 
     def __init__(self, values: ArrayLike, grid: GridMap) -> None:
@@ -61,7 +69,7 @@ class Heatmap:
         support = np.flatnonzero(scaled > 0)
         if not len(support):
             raise HeatmapError(
-                f"the heat map is 0 on all free space of {grid.name}: there is nothing to draw; "
+                f"the heat map is 0 on all free space of {grid.name}: there is nothing to sample; "
                 "use Heatmap.uniform where nothing is known"
             )
         scaled.setflags(write=False)
@@ -90,12 +98,16 @@ class Heatmap:
 
     @classmethod
     def uniform(cls, grid: GridMap) -> Heatmap:
-        """The control that knows nothing: 1 on all free space."""
+        """Return the trivial control: 1 on all free space.
+
+        Args:
+            grid: the map.
+        """
         return cls(grid.free, grid)
 
     @classmethod
     def straight_line(cls, grid: GridMap, start: ArrayLike, goal: ArrayLike) -> Heatmap:
-        """The cheap control: a band around the segment from start to goal, obstacles ignored.
+        """Return a band around the segment from start to goal, obstacles ignored.
 
         Args:
             grid: the map.
@@ -105,15 +117,20 @@ class Heatmap:
         Raises:
             TaskError: see :meth:`GridMap.check_task`.
         """
-        ends = grid.check_task(start, goal)
-        return cls(_band(grid.shape, grid.to_pixel(ends), _half_width(grid, _CORRIDOR_SHARE)), grid)
+        endpoints = grid.check_task(start, goal)
+        return cls(
+            _paint_band(
+                grid.shape, grid.to_pixel(endpoints), _half_width(grid, _CORRIDOR_FRACTION)
+            ),
+            grid,
+        )
 
     @classmethod
     def corridor(cls, grid: GridMap, start: ArrayLike, goal: ArrayLike) -> Heatmap:
-        """The oracle control: a band around the shortest path that a grid search finds.
+        """Return a band around the shortest path that a grid search finds: the oracle control.
 
         The search is 8-connected without cutting corners, its path pulled taut. It shows what a
-        perfect heat map is worth; it is no planner of ours, since it solves the task itself.
+        perfect heat map is worth; it solves the task of a point robot by itself.
 
         Args:
             grid: the map.
@@ -123,11 +140,11 @@ class Heatmap:
         Raises:
             TaskError: see :meth:`GridMap.check_task`.
         """
-        ends = grid.to_pixel(grid.check_task(start, goal))
-        pixels = shortest_path(grid.free, *pixel_pair(ends))
+        endpoints = grid.to_pixel(grid.check_task(start, goal))
+        pixels = shortest_path(grid.free, *pixel_pair(endpoints))
         assert pixels is not None, "check_task has made sure that a path exists"
-        path = np.vstack((ends[:1], pull_taut(grid.free, pixels), ends[1:]))
-        return cls(_band(grid.shape, path, _half_width(grid, _CORRIDOR_SHARE)), grid)
+        path = np.vstack((endpoints[:1], pull_taut(grid.free, pixels), endpoints[1:]))
+        return cls(_paint_band(grid.shape, path, _half_width(grid, _CORRIDOR_FRACTION)), grid)
 
     @property
     def region(self) -> NDArray[np.bool_]:
@@ -135,56 +152,55 @@ class Heatmap:
         return self.values >= REGION_THRESHOLD
 
     @cached_property
-    def parts(self) -> NDArray[np.int32]:
+    def components(self) -> NDArray[np.int32]:
         """The 4-connected parts of the region, numbered from 1; 0 outside of it, shape (H, W)."""
-        parts = cv2.connectedComponents(self.region.view(np.uint8), connectivity=4)[1]
-        return np.asarray(parts, np.int32)
+        return label_components(self.region, connectivity=4)
 
     def connects(self, start: ArrayLike, goal: ArrayLike) -> bool:
-        """Whether the region holds both ends and a 4-connected way between them.
+        """Return whether the region holds both points and a 4-connected path between them.
 
         Args:
             start: (x, y), world.
             goal: (x, y), world.
         """
-        ends = np.array((start, goal), dtype=np.float64)
-        if not self.grid.is_free(ends).all():
+        endpoints = np.array((start, goal), dtype=np.float64)
+        if not self.grid.is_free(endpoints).all():
             return False
-        first, second = pixel_pair(self.grid.to_pixel(ends))
-        label = int(self.parts[first[1], first[0]])
-        return label > 0 and label == int(self.parts[second[1], second[0]])
+        first, second = pixel_pair(self.grid.to_pixel(endpoints))
+        label = int(self.components[first[1], first[0]])
+        return label > 0 and label == int(self.components[second[1], second[0]])
 
     def connected(self, start: ArrayLike, goal: ArrayLike) -> Heatmap:
-        """This heat map with a region that joins start and goal.
+        """Return this heat map with a region that connects start and goal.
 
-        Where the region falls apart, its parts are joined by the cheapest path through the heat
-        map: next to free of charge inside the region, the dearer outside the lower the value.
+        Where the region falls apart, its parts are connected by the cheapest path through the heat
+        map: inside the region a pixel costs next to nothing, outside the more the lower its value.
 
         Args:
             start: (x, y), world.
             goal: (x, y), world.
 
         Returns:
-            The heat map itself when its region joins them already.
+            The heat map itself when its region connects them already.
 
         Raises:
             TaskError: see :meth:`GridMap.check_task`.
         """
-        ends = self.grid.to_pixel(self.grid.check_task(start, goal))
+        endpoints = self.grid.to_pixel(self.grid.check_task(start, goal))
         if self.connects(start, goal):
             return self
-        price = np.where(self.region, np.float32(_REGION_PRICE), 1 + _REGION_PRICE - self.values)
-        pixels = shortest_path(self.grid.free, *pixel_pair(ends), price, _REPAIR_SIDE)
+        cost = np.where(self.region, np.float32(_REGION_COST), 1 + _REGION_COST - self.values)
+        pixels = shortest_path(self.grid.free, *pixel_pair(endpoints), cost, _REPAIR_SIZE)
         assert pixels is not None, "check_task has made sure that a path exists"
-        bridge = _band(
-            self.grid.shape, pixels + np.float64(0.5), _half_width(self.grid, _BRIDGE_SHARE)
+        bridge = _paint_band(
+            self.grid.shape, pixels + np.float64(0.5), _half_width(self.grid, _BRIDGE_FRACTION)
         )
         return Heatmap(np.maximum(self.values, bridge), self.grid)
 
     def sample(self, n: int, rng: np.random.Generator | int | None = None) -> NDArray[np.float64]:
-        """Draw points with a density proportional to the values.
+        """Sample points with a density proportional to the values.
 
-        Pixels are drawn exactly, by the inverse of the cumulative sum; inside its pixel a point
+        Pixels are sampled exactly, by the inverse of the cumulative sum; inside its pixel a point
         is uniform.
 
         Args:
@@ -196,8 +212,8 @@ class Heatmap:
         """
         generator = np.random.default_rng(rng)
         cumulative = self.values.ravel()[self._support].cumsum(dtype=np.float64)
-        pixels = draw_pixels(self._support, cumulative, n, generator)
-        return points_in(self.grid, pixels, generator)
+        pixels = sample_pixels(self._support, cumulative, n, generator)
+        return sample_in_pixels(self.grid, pixels, generator)
 
     @property
     def support(self) -> NDArray[np.intp]:
@@ -205,17 +221,17 @@ class Heatmap:
         return self._support
 
     def __repr__(self) -> str:
-        share = self.region.sum() / self.grid.free.sum()
-        return f"Heatmap({self.grid.name!r}, region {share:.0%} of free space)"
+        fraction = self.region.sum() / self.grid.free.sum()
+        return f"Heatmap({self.grid.name!r}, region {fraction:.0%} of free space)"
 
 
-def draw_pixels(
+def sample_pixels(
     support: NDArray[np.intp],
     cumulative: NDArray[np.float64] | None,
     n: int,
     rng: np.random.Generator,
 ) -> NDArray[np.intp]:
-    """Draw some of the pixels of a heat map.
+    """Sample some of the pixels of a heat map.
 
     Args:
         support: flat row-major pixel indices, shape (K,).
@@ -235,10 +251,10 @@ def draw_pixels(
     return pixels
 
 
-def points_in(
+def sample_in_pixels(
     grid: GridMap, pixels: NDArray[np.intp], rng: np.random.Generator
 ) -> NDArray[np.float64]:
-    """A uniform point in each of some pixels.
+    """Sample a uniform point in each of some pixels.
 
     Args:
         grid: the map.
@@ -253,7 +269,7 @@ def points_in(
 
 
 def _to_unit_range(raw: NDArray[Any]) -> NDArray[np.float32]:
-    """A fresh array of the values in [0, 1]."""
+    """Return a fresh array of the values in [0, 1]."""
     if raw.dtype.kind in "bu":
         is_mask = raw.dtype.kind == "b" or raw.max() <= 1
         full = 1 if is_mask else np.iinfo(raw.dtype).max
@@ -274,17 +290,17 @@ def _to_unit_range(raw: NDArray[Any]) -> NDArray[np.float32]:
     return values
 
 
-def pixel_pair(ends: NDArray[np.float64]) -> tuple[tuple[int, int], tuple[int, int]]:
-    """The pixels (column, row) of two points (u, v), shape (2, 2)."""
-    (u0, v0), (u1, v1) = np.floor(ends).astype(int).tolist()
+def pixel_pair(endpoints: NDArray[np.float64]) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Return the pixels (column, row) of two points (u, v), shape (2, 2)."""
+    (u0, v0), (u1, v1) = np.floor(endpoints).astype(int).tolist()
     return (u0, v0), (u1, v1)
 
 
-def _half_width(grid: GridMap, share: float) -> float:
-    return max(_MIN_HALF_WIDTH, share * max(grid.shape))
+def _half_width(grid: GridMap, fraction: float) -> float:
+    return max(_MIN_HALF_WIDTH, fraction * max(grid.shape))
 
 
-def _band(
+def _paint_band(
     shape: tuple[int, int], path: NDArray[np.float64], half_width: float
 ) -> NDArray[np.float32]:
     """Paint a polyline of pixel points (M, 2): 1 on it, 0.5 at ``half_width`` pixels from it."""

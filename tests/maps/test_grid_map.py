@@ -11,7 +11,8 @@ import pytest
 
 from cbagan_ompl.errors import MapError, TaskError
 from cbagan_ompl.maps.collision import segment_is_free
-from cbagan_ompl.maps.grid_map import MAX_SIDE, GridMap
+from cbagan_ompl.maps.grid_map import GridMap
+from cbagan_ompl.maps.raw_map import MAX_SIDE
 
 
 def random_free(rng, height, width, blocked=0.3):
@@ -40,9 +41,9 @@ def test_resolution_scales_the_image_frame():
 
 def test_ros_frame_has_its_origin_at_the_lower_left_corner():
     grid = GridMap([[1, 0, 1], [1, 1, 1]], resolution=0.5, origin=(10, 20, 0))
-    np.testing.assert_allclose(grid.to_pixel([10, 20]), [0, 2])  # lower left corner of the picture
+    np.testing.assert_allclose(grid.to_pixel([10, 20]), [0, 2])  # lower left corner of the image
     np.testing.assert_allclose(grid.to_world([0, 0]), [10, 21])
-    # The blocked pixel is in the upper row of the picture, so at larger y.
+    # The blocked pixel is in the upper row of the image, so at larger y.
     assert not grid.is_free((10.75, 20.75))
     assert grid.is_free((10.75, 20.25))
 
@@ -280,7 +281,7 @@ def test_check_task_returns_arrays(divided):
         ((1e300, 0.5), (0.5, 0.5), "start .* is outside"),
         ((0.5, 0.5), (0.5, -0.1), "goal .* is outside"),
         ((0.5, 0.5), (4, 1), "goal .* is outside"),
-        ((0.5, 0.5), (3.5, 0.5), "no path joins"),
+        ((0.5, 0.5), (3.5, 0.5), "no path connects"),
         ((0.5, np.nan), (0.5, 0.5), "start must be two finite numbers"),
         ((0.5, 0.5), (1, 2, 3), "goal must be two finite numbers"),
         ((0.5, 0.5), "A1", "goal must be two finite numbers"),

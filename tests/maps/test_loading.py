@@ -11,14 +11,15 @@ import numpy as np
 import pytest
 
 from cbagan_ompl.errors import ConfigError, MapError
-from cbagan_ompl.maps.grid_map import MAX_SIDE, GridMap
-from cbagan_ompl.maps.loading import MapOptions, bundled_maps, load_map
+from cbagan_ompl.maps.grid_map import GridMap
+from cbagan_ompl.maps.loading import MapOptions, bundled_maps
+from cbagan_ompl.maps.raw_map import MAX_SIDE
 
 GRAYS = np.array([[0, 100, 127, 128], [200, 205, 254, 255]], dtype=np.uint8)
 SHAPE = np.kron([[1, 0, 1], [1, 1, 0]], np.ones((16, 16))).astype(np.uint8) * 255
 
 
-def picture(path, pixels, *flags):
+def image(path, pixels, *flags):
     """Write pixels in the format that the suffix of the path names."""
     done, data = cv2.imencode(path.suffix, pixels, list(flags))
     assert done
@@ -32,63 +33,63 @@ def png_header(width, height):
     return b"\x89PNG\r\n\x1a\n\0\0\0\r" + chunk + struct.pack(">I", zlib.crc32(chunk))
 
 
-# --- pictures ---------------------------------------------------------------------------------
+# --- images ---------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("suffix", [".png", ".bmp", ".pgm", ".jpg", ".jpeg", ".PNG", ".Jpg"])
-def test_pictures(tmp_path, suffix):
-    grid = GridMap.load(picture(tmp_path / f"some map.v2{suffix}", SHAPE))
+def test_images(tmp_path, suffix):
+    grid = GridMap.load(image(tmp_path / f"some map.v2{suffix}", SHAPE))
     np.testing.assert_array_equal(grid.free, SHAPE > 0)
     assert (grid.name, grid.resolution, grid.origin) == ("some map.v2", 1.0, None)
 
 
 def test_path_may_be_a_string_with_any_characters(tmp_path):
     path = tmp_path / "Lageplan Größe 図.png"
-    picture(path, SHAPE)
-    assert load_map(str(path)).name == "Lageplan Größe 図"
+    image(path, SHAPE)
+    assert GridMap.load(str(path)).name == "Lageplan Größe 図"
 
 
 def test_half_is_the_threshold_between_127_and_128(tmp_path):
-    path = picture(tmp_path / "grays.png", GRAYS)
-    assert load_map(path).free.tolist() == (GRAYS >= 128).tolist()
+    path = image(tmp_path / "grays.png", GRAYS)
+    assert GridMap.load(path).free.tolist() == (GRAYS >= 128).tolist()
 
 
 @pytest.mark.parametrize(
     ("threshold", "first"), [(0, 0), (100 / 255, 100), (100.01 / 255, 127), (0.8, 205), (1, 255)]
 )
 def test_threshold_is_met_by_equal_levels(tmp_path, threshold, first):
-    path = picture(tmp_path / "grays.png", GRAYS)
-    grid = load_map(path, threshold=threshold)
+    path = image(tmp_path / "grays.png", GRAYS)
+    grid = GridMap.load(path, threshold=threshold)
     assert sorted(GRAYS[grid.free]) == [level for level in GRAYS.ravel() if level >= first]
 
 
 def test_16_bits_are_measured_against_65535(tmp_path):
     levels = np.array([[0, 255, 32767, 32768, 65535]], dtype=np.uint16)
     for name in ("deep.png", "deep.pgm"):
-        free = load_map(picture(tmp_path / name, levels)).free
+        free = GridMap.load(image(tmp_path / name, levels)).free
         assert free.tolist() == [[False, False, False, True, True]]
 
 
 def test_colour_becomes_gray_by_its_brightness(tmp_path):
     blue_green_red = np.array([[(255, 0, 0), (0, 255, 0), (0, 0, 255), (0, 255, 255)]], np.uint8)
     for name in ("colour.png", "colour.bmp"):
-        path = picture(tmp_path / name, blue_green_red)
-        assert load_map(path).free.tolist() == [[False, True, False, True]]
-        assert load_map(path, threshold=0.29).free.tolist() == [[False, True, True, True]]
+        path = image(tmp_path / name, blue_green_red)
+        assert GridMap.load(path).free.tolist() == [[False, True, False, True]]
+        assert GridMap.load(path, threshold=0.29).free.tolist() == [[False, True, True, True]]
 
 
 def test_transparent_pixels_are_unknown(tmp_path):
     bgra = np.zeros((1, 4, 4), np.uint8)
     bgra[0, :, :3] = np.array([255, 255, 255, 0])[:, None]
     bgra[0, :, 3] = 255, 254, 0, 255
-    path = picture(tmp_path / "alpha.png", bgra)
-    assert load_map(path).free.tolist() == [[True, False, False, False]]
-    assert load_map(path, unknown_is_free=True).free.tolist() == [[True, True, True, False]]
+    path = image(tmp_path / "alpha.png", bgra)
+    assert GridMap.load(path).free.tolist() == [[True, False, False, False]]
+    assert GridMap.load(path, unknown_is_free=True).free.tolist() == [[True, True, True, False]]
 
 
 def test_bilevel_png(tmp_path):
-    path = picture(tmp_path / "bits.png", SHAPE, cv2.IMWRITE_PNG_BILEVEL, 1)
-    np.testing.assert_array_equal(load_map(path).free, SHAPE > 0)
+    path = image(tmp_path / "bits.png", SHAPE, cv2.IMWRITE_PNG_BILEVEL, 1)
+    np.testing.assert_array_equal(GridMap.load(path).free, SHAPE > 0)
 
 
 @pytest.mark.parametrize(
@@ -105,71 +106,71 @@ def test_bilevel_png(tmp_path):
 def test_pgm_in_all_its_forms(tmp_path, data, free):
     path = tmp_path / "some.pgm"
     path.write_bytes(data)
-    assert load_map(path).free.tolist() == np.array(free, dtype=bool).tolist()
+    assert GridMap.load(path).free.tolist() == np.array(free, dtype=bool).tolist()
 
 
 def test_content_counts_not_the_suffix(tmp_path):
-    picture(tmp_path / "a.png", SHAPE).rename(tmp_path / "a.pgm")
-    np.testing.assert_array_equal(load_map(tmp_path / "a.pgm").free, SHAPE > 0)
+    image(tmp_path / "a.png", SHAPE).rename(tmp_path / "a.pgm")
+    np.testing.assert_array_equal(GridMap.load(tmp_path / "a.pgm").free, SHAPE > 0)
 
 
-# --- broken pictures --------------------------------------------------------------------------
+# --- broken images --------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("suffix", [".png", ".bmp", ".pgm", ".jpg"])
 @pytest.mark.parametrize("kept", [0.02, 0.3, 0.6, 0.98])
-def test_truncated_pictures(tmp_path, suffix, kept):
+def test_truncated_images(tmp_path, suffix, kept):
     noise = np.random.default_rng(0).integers(0, 2, (90, 70)).astype(np.uint8) * 255
-    path = picture(tmp_path / f"cut{suffix}", noise)
+    path = image(tmp_path / f"cut{suffix}", noise)
     data = path.read_bytes()
     path.write_bytes(data[: int(len(data) * kept)])
-    with pytest.raises(MapError, match=r"cut\.\w+: the (picture is truncated|PGM header is incom)"):
-        load_map(path)
+    with pytest.raises(MapError, match=r"cut\.\w+: the (image is truncated|PGM header is incom)"):
+        GridMap.load(path)
 
 
 @pytest.mark.parametrize("suffix", [".png", ".bmp", ".pgm", ".jpg"])
-def test_no_prefix_of_a_picture_is_a_map(tmp_path, suffix):
-    path = picture(tmp_path / f"cut{suffix}", SHAPE[:20, :20])
+def test_no_prefix_of_a_image_is_a_map(tmp_path, suffix):
+    path = image(tmp_path / f"cut{suffix}", SHAPE[:20, :20])
     data = path.read_bytes()
     for length in range(0, len(data), 7):
         path.write_bytes(data[:length])
         with pytest.raises(MapError):
-            load_map(path)
+            GridMap.load(path)
     path.write_bytes(data[:-1])
     with pytest.raises(MapError):
-        load_map(path)
+        GridMap.load(path)
 
 
-def test_truncated_progressive_and_run_length_pictures(tmp_path):
+def test_truncated_progressive_and_run_length_images(tmp_path):
     noise = np.random.default_rng(0).integers(0, 2, (90, 70)).astype(np.uint8) * 255
-    path = picture(tmp_path / "waves.jpg", noise, cv2.IMWRITE_JPEG_PROGRESSIVE, 1)
+    path = image(tmp_path / "waves.jpg", noise, cv2.IMWRITE_JPEG_PROGRESSIVE, 1)
     data = path.read_bytes()
     path.write_bytes(data[: len(data) // 2])
     with pytest.raises(MapError, match="truncated"):
-        load_map(path)
+        GridMap.load(path)
     # A BMP header that announces 1000 bytes of run lengths.
     header = struct.pack("<2sIHHIIiiHHII", b"BM", 1078, 0, 0, 78, 40, 8, 8, 1, 8, 1, 1000)
     path.write_bytes(header + bytes(100))
     with pytest.raises(MapError, match="truncated"):
-        load_map(path)
+        GridMap.load(path)
 
 
 @pytest.mark.parametrize("suffix", [".png", ".jpg", ".jpeg", ".bmp", ".pgm"])
 @pytest.mark.parametrize("data", [b"", b"hello world\n" * 50, b"\0" * 500])
-def test_no_picture_at_all(tmp_path, suffix, data):
+def test_no_image_at_all(tmp_path, suffix, data):
     path = tmp_path / f"odd{suffix}"
     path.write_bytes(data)
     with pytest.raises(MapError, match=f"odd{suffix}: the (file is empty|content is no PNG)"):
-        load_map(path)
+        GridMap.load(path)
 
 
-def test_damaged_picture(tmp_path):
-    path = picture(tmp_path / "damaged.png", SHAPE)
+def test_damaged_image(tmp_path):
+    path = image(tmp_path / "damaged.png", SHAPE)
     data = bytearray(path.read_bytes())
     data[len(data) // 2] ^= 0xFF
     path.write_bytes(data)
     with pytest.raises(MapError, match="damaged"):
-        load_map(path)
+        GridMap.load(path)
 
 
 @pytest.mark.parametrize(
@@ -183,11 +184,11 @@ def test_damaged_picture(tmp_path):
         b"\xff\xd8\xff\xff\xc0\0\x0b\x08" + struct.pack(">HHB", 60_000, 60_000, 1) + b"\x01\x11\0",
     ],
 )
-def test_huge_pictures_are_refused_by_their_header(tmp_path, data):
+def test_huge_images_are_refused_by_their_header(tmp_path, data):
     path = tmp_path / "huge.png"
     path.write_bytes(data)
     with pytest.raises(MapError, match=f"huge.png: .* maps up to {MAX_SIDE} pixels"):
-        load_map(path)
+        GridMap.load(path)
 
 
 @pytest.mark.parametrize(
@@ -212,14 +213,14 @@ def test_broken_pgm(tmp_path, data, message):
     path = tmp_path / "broken.pgm"
     path.write_bytes(data)
     with pytest.raises(MapError, match=message):
-        load_map(path)
+        GridMap.load(path)
 
 
-def test_all_dark_picture_names_the_way_out(tmp_path):
-    path = picture(tmp_path / "night.png", np.full((4, 4), 90, np.uint8))
+def test_all_dark_image_names_the_way_out(tmp_path):
+    path = image(tmp_path / "night.png", np.full((4, 4), 90, np.uint8))
     with pytest.raises(MapError, match=r"night.png: no pixel .* threshold 0\.5; choose a lower"):
-        load_map(path)
-    assert load_map(path, threshold=0.3).free.all()
+        GridMap.load(path)
+    assert GridMap.load(path, threshold=0.3).free.all()
 
 
 # --- other files, options, bundled maps -------------------------------------------------------
@@ -228,13 +229,13 @@ def test_all_dark_picture_names_the_way_out(tmp_path):
 def test_missing_files_folders_and_unknown_kinds(tmp_path):
     for name in ("none.png", "none.yaml", "none.map", "nul\0.png"):
         with pytest.raises(MapError, match=r"cannot read .*none|cannot read .*nul"):
-            load_map(tmp_path / name)
+            GridMap.load(tmp_path / name)
     (tmp_path / "folder.png").mkdir()
     with pytest.raises(MapError, match=r"cannot read .*folder.png"):
-        load_map(tmp_path / "folder.png")
+        GridMap.load(tmp_path / "folder.png")
     for name in ("map.tiff", "map"):
         with pytest.raises(MapError, match=r"unknown kind .* \.png, .*\.yaml .*\.map .*bundled:"):
-            load_map(tmp_path / name)
+            GridMap.load(tmp_path / name)
 
 
 @pytest.mark.parametrize(
@@ -250,7 +251,7 @@ def test_missing_files_folders_and_unknown_kinds(tmp_path):
 )
 def test_options_that_make_no_sense(tmp_path, options, message):
     with pytest.raises(ConfigError, match=message):
-        load_map(picture(tmp_path / "a.png", SHAPE), **options)
+        GridMap.load(image(tmp_path / "a.png", SHAPE), **options)
     assert MapOptions() == MapOptions(threshold=0.5, unknown_is_free=False)
 
 
@@ -270,7 +271,7 @@ def test_bundled_maps():
 # --- ROS maps ---------------------------------------------------------------------------------
 
 KEYS = {
-    "image": "picture.pgm",
+    "image": "image.pgm",
     "resolution": "0.05",
     "origin": "[-1.5, 2.0, 0.0]",
     "negate": "0",
@@ -286,7 +287,7 @@ def ros(tmp_path):
     def write(pixels=GRAYS, **keys):
         keys = {**KEYS, **keys}
         if pixels is not None:
-            picture(tmp_path / keys["image"], pixels)
+            image(tmp_path / keys["image"], pixels)
         lines = [f"{key}: {value}" for key, value in keys.items() if value is not None]
         path = tmp_path / "office.yaml"
         path.write_text("\n".join(lines), encoding="utf-8")
@@ -298,7 +299,7 @@ def ros(tmp_path):
 def test_ros_map_has_its_frame(ros):
     pixels = np.full((4, 6), 254, np.uint8)
     pixels[0, 5] = 0
-    grid = load_map(ros(pixels))
+    grid = GridMap.load(ros(pixels))
     assert (grid.name, grid.resolution, grid.origin) == ("office", 0.05, (-1.5, 2.0, 0.0))
     assert grid.free.tolist() == (pixels > 0).tolist()  # row 0 stays on top ...
     assert not grid.is_free((-1.5 + 5.5 * 0.05, 2.0 + 3.5 * 0.05))  # ... which is at the largest y
@@ -308,14 +309,14 @@ def test_ros_map_has_its_frame(ros):
 def test_ros_yaw(ros):
     pixels = np.full((4, 6), 254, np.uint8)
     pixels[0, 5] = 0
-    grid = load_map(ros(pixels, origin=f"[1, 2, {pi / 2}]"))
+    grid = GridMap.load(ros(pixels, origin=f"[1, 2, {pi / 2}]"))
     # 5.5 pixels along the turned x axis (up) and 3.5 along the turned y axis (left).
     assert not grid.is_free((1 - 3.5 * 0.05, 2 + 5.5 * 0.05))
 
 
 @pytest.mark.parametrize(("free_thresh", "free_205"), [("0.196", False), ("0.25", True)])
 def test_ros_unknown_gray_205_depends_on_free_thresh(ros, free_thresh, free_205):
-    grid = load_map(ros(np.array([[0, 205, 254]], np.uint8), free_thresh=free_thresh))
+    grid = GridMap.load(ros(np.array([[0, 205, 254]], np.uint8), free_thresh=free_thresh))
     assert grid.free.tolist() == [[False, free_205, True]]
 
 
@@ -323,22 +324,22 @@ def test_ros_thresholds_are_met_by_equal_values(ros):
     # p of the gray level 204 is 0.2 exactly, that of 102 is 0.6.
     pixels = np.array([[101, 102, 103, 203, 204, 205]], np.uint8)
     path = ros(pixels, free_thresh="0.2", occupied_thresh="0.6")
-    assert load_map(path).free.tolist() == [[False, False, False, False, True, True]]
-    known = load_map(path, unknown_is_free=True)
+    assert GridMap.load(path).free.tolist() == [[False, False, False, False, True, True]]
+    known = GridMap.load(path, unknown_is_free=True)
     assert known.free.tolist() == [[False, False, True, True, True, True]]
 
 
 @pytest.mark.parametrize("negate", ["1", "true", "yes"])
 def test_ros_negate(ros, negate):
-    grid = load_map(ros(negate=negate))
+    grid = GridMap.load(ros(negate=negate))
     assert grid.free.tolist() == (GRAYS <= 0.196 * 255).tolist()
 
 
 @pytest.mark.parametrize("mode", ["trinary", "Trinary", "scale", "SCALE", None])
 def test_ros_unknown_and_partly_occupied_are_blocked_unless_asked(ros, mode):
     path = ros(mode=mode)
-    assert load_map(path).free.tolist() == (GRAYS > 205).tolist()
-    assert load_map(path, unknown_is_free=True).free.tolist() == (GRAYS >= 100).tolist()
+    assert GridMap.load(path).free.tolist() == (GRAYS > 205).tolist()
+    assert GridMap.load(path, unknown_is_free=True).free.tolist() == (GRAYS >= 100).tolist()
 
 
 @pytest.mark.parametrize("mode", ["trinary", "scale"])
@@ -346,47 +347,47 @@ def test_ros_transparent_is_unknown(ros, mode):
     bgra = np.full((1, 3, 4), 255, np.uint8)
     bgra[0, 1, 3] = 254
     bgra[0, 2] = 0, 0, 0, 0  # black, but transparent: not known to be occupied
-    path = ros(bgra, image="picture.png", mode=mode)
-    assert load_map(path).free.tolist() == [[True, False, False]]
-    assert load_map(path, unknown_is_free=True).free.all()
+    path = ros(bgra, image="image.png", mode=mode)
+    assert GridMap.load(path).free.tolist() == [[True, False, False]]
+    assert GridMap.load(path, unknown_is_free=True).free.all()
 
 
 def test_ros_raw_levels_are_percent(ros):
     pixels = np.array([[0, 25, 26, 64, 65, 100, 101, 255]], np.uint8)
     keys = {"mode": "raw", "free_thresh": "0.25", "negate": "1"}
     path = ros(pixels, **keys)
-    assert load_map(path).free.tolist() == [[True, True, *[False] * 6]]
-    assert load_map(path, unknown_is_free=True).free.tolist() == (
+    assert GridMap.load(path).free.tolist() == [[True, True, *[False] * 6]]
+    assert GridMap.load(path, unknown_is_free=True).free.tolist() == (
         [[True, True, True, True, False, False, True, True]]
     )
     # 16 bits are brought down to 8 first, as by map_server.
-    deep = ros(pixels.astype(np.uint16) * 257, image="picture.png", **keys)
-    assert load_map(deep).free.tolist() == [[True, True, *[False] * 6]]
+    deep = ros(pixels.astype(np.uint16) * 257, image="image.png", **keys)
+    assert GridMap.load(deep).free.tolist() == [[True, True, *[False] * 6]]
 
 
 def test_ros_raw_looks_at_no_transparency(ros):
     bgra = np.zeros((1, 2, 4), np.uint8)
     bgra[0, 1, :3] = 90
-    path = ros(bgra, image="picture.png", mode="raw")
-    assert load_map(path).free.tolist() == [[True, False]]
-    assert load_map(path, unknown_is_free=True).free.tolist() == [[True, False]]
+    path = ros(bgra, image="image.png", mode="raw")
+    assert GridMap.load(path).free.tolist() == [[True, False]]
+    assert GridMap.load(path, unknown_is_free=True).free.tolist() == [[True, False]]
 
 
-def test_ros_picture_of_other_formats_in_other_folders(ros, tmp_path):
-    (tmp_path / "pictures").mkdir()
+def test_ros_image_of_other_formats_in_other_folders(ros, tmp_path):
+    (tmp_path / "images").mkdir()
     colour = cv2.cvtColor(GRAYS, cv2.COLOR_GRAY2BGR)
-    for image in ("pictures/a.png", "pictures/a.bmp", str(tmp_path / "pictures" / "b.png")):
-        assert load_map(ros(colour, image=image)).free.tolist() == (GRAYS > 205).tolist()
+    for image in ("images/a.png", "images/a.bmp", str(tmp_path / "images" / "b.png")):
+        assert GridMap.load(ros(colour, image=image)).free.tolist() == (GRAYS > 205).tolist()
 
 
 def test_ros_numbers_that_only_ros_reads(ros):
-    assert load_map(ros(resolution="5e-2")).resolution == 0.05
+    assert GridMap.load(ros(resolution="5e-2")).resolution == 0.05
 
 
 @pytest.mark.parametrize("key", list(KEYS))
 def test_ros_missing_key(ros, key):
     with pytest.raises(MapError, match=rf"office.yaml: missing keys: {key}$"):
-        load_map(ros(**{key: None}, pixels=None))
+        GridMap.load(ros(**{key: None}, pixels=None))
 
 
 @pytest.mark.parametrize(
@@ -417,21 +418,21 @@ def test_ros_missing_key(ros, key):
 )
 def test_ros_values_that_make_no_sense(ros, key, value, reason):
     with pytest.raises(MapError, match=f"Failed to read .*office.yaml, key '{key}' = .*{reason}"):
-        load_map(ros(**{key: value}))
+        GridMap.load(ros(**{key: value}))
 
 
-def test_ros_pictures_that_cannot_be_read(ros, tmp_path):
+def test_ros_images_that_cannot_be_read(ros, tmp_path):
     for image, reason in (("gone.pgm", "cannot read .*gone.pgm"), ("", "path"), ("7", "path")):
         with pytest.raises(MapError, match=f"key 'image' = .*{reason}"):
-            load_map(ros(None, image=image))
+            GridMap.load(ros(None, image=image))
     (tmp_path / "cut.pgm").write_bytes(b"P5 9 9 255\n")
-    with pytest.raises(MapError, match=r"key 'image' = 'cut.pgm': .*cut.pgm: the picture is trunc"):
-        load_map(ros(None, image="cut.pgm"))
+    with pytest.raises(MapError, match=r"key 'image' = 'cut.pgm': .*cut.pgm: the image is trunc"):
+        GridMap.load(ros(None, image="cut.pgm"))
 
 
 def test_ros_map_without_free_pixels_says_how_it_was_read(ros):
     with pytest.raises(MapError, match=r"no pixel .* mode trinary, negate 0 and free_thresh 0.196"):
-        load_map(ros(np.full((2, 2), 205, np.uint8)))
+        GridMap.load(ros(np.full((2, 2), 205, np.uint8)))
 
 
 @pytest.mark.parametrize(
@@ -452,7 +453,7 @@ def test_ros_no_yaml(tmp_path, text, reason):
     path = tmp_path / "office.yml"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(MapError, match=rf"(?s)Failed to read .*office.yml: .*{reason}"):
-        load_map(path)
+        GridMap.load(path)
 
 
 # --- MovingAI maps ----------------------------------------------------------------------------
@@ -467,7 +468,7 @@ def moving_ai(rows=ROWS, height=3, width=5, first="type octile"):
 def test_moving_ai_terrain(tmp_path):
     path = tmp_path / "arena.map"
     path.write_text(moving_ai())
-    grid = load_map(path)
+    grid = GridMap.load(path)
     assert grid.free.astype(int).tolist() == [[1, 1, 1, 0, 0], [0, 0, 1, 1, 1], [1] * 5]
     assert (grid.name, grid.origin, grid.resolution) == ("arena", None, 1.0)
 
@@ -476,9 +477,9 @@ def test_moving_ai_line_ends_and_order_do_not_matter(tmp_path):
     path = tmp_path / "arena.map"
     text = "type tile\nwidth  5 \nheight 3\nmap\n" + "\n".join(ROWS) + " \n\n\n"
     path.write_bytes(text.replace("\n", "\r\n").encode())
-    assert load_map(path).shape == (3, 5)
+    assert GridMap.load(path).shape == (3, 5)
     path.write_text(moving_ai().rstrip())
-    assert load_map(path).shape == (3, 5)
+    assert GridMap.load(path).shape == (3, 5)
 
 
 @pytest.mark.parametrize(
@@ -510,11 +511,11 @@ def test_moving_ai_broken(tmp_path, text, message):
     path = tmp_path / "broken.map"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(MapError, match=message):
-        load_map(path)
+        GridMap.load(path)
 
 
 def test_moving_ai_no_text(tmp_path):
     path = tmp_path / "binary.map"
     path.write_bytes(png_header(5, 5))
     with pytest.raises(MapError, match=r"binary.map is no text file"):
-        load_map(path)
+        GridMap.load(path)

@@ -7,7 +7,7 @@ import pytest
 
 from cbagan_ompl.errors import MapError
 from cbagan_ompl.maps.grid_map import GridMap
-from cbagan_ompl.maps.loading import bundled_maps, load_map
+from cbagan_ompl.maps.loading import bundled_maps
 from cbagan_ompl.maps.tasks import Task, load_tasks, tasks_of
 
 GRID = GridMap(np.ones((4, 6)), name="arena")
@@ -136,7 +136,7 @@ def test_other_files(tmp_path):
 
 def test_tasks_beside_a_moving_ai_map(tmp_path):
     path = written(tmp_path / "arena.map", "type octile\nheight 4\nwidth 6\nmap\n" + "......\n" * 4)
-    assert tasks_of(path, load_map(path)) == []
+    assert tasks_of(path, GridMap.load(path)) == []
     written(tmp_path / "arena.scen", SCEN)
     assert len(tasks_of(str(path), GRID)) == 2
     written(tmp_path / "arena.map.scen", SCEN[: SCEN.index("3\tarena")])  # has precedence
@@ -150,7 +150,7 @@ def test_other_maps_come_without_tasks(tmp_path):
 
 @pytest.mark.parametrize("name", bundled_maps())
 def test_bundled_tasks_can_be_planned_for(name):
-    grid = load_map(f"bundled:{name}")
+    grid = GridMap.load(f"bundled:{name}")
     tasks = tasks_of(f"bundled:{name}", grid)
     assert len(tasks) == 4
     for task in tasks:

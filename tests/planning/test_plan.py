@@ -215,7 +215,7 @@ def test_bad_input(
 def test_separate_parts_are_told_at_once() -> None:
     free = np.ones((50, 50), bool)
     free[:, 25] = False
-    with pytest.raises(TaskError, match=r"no path joins start \(10, 10\) and goal \(40, 10\)"):
+    with pytest.raises(TaskError, match=r"no path connects start \(10, 10\) and goal \(40, 10\)"):
         plan(GridMap(free), (10, 10), (40, 10), sampler="uniform", time=60)
 
 

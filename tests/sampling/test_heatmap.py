@@ -118,7 +118,7 @@ def test_joined_refuses_separate_parts() -> None:
     free = np.ones((9, 9), bool)
     free[:, 4] = False
     grid = GridMap(free)
-    with pytest.raises(TaskError, match="no path joins"):
+    with pytest.raises(TaskError, match="no path connects"):
         Heatmap.uniform(grid).connected((1, 1), (8, 8))
 
 

@@ -1,0 +1,71 @@
+"""Where the heat map of a plan comes from, by the name of the sampler."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from os import PathLike
+from typing import TYPE_CHECKING
+
+from numpy.typing import ArrayLike
+
+from ..errors import ConfigError
+from ..maps.grid_map import GridMap
+from ..sampling.heatmap import Heatmap
+
+if TYPE_CHECKING:
+    from ..inference.predictor import Predictor
+
+#: OMPL's own sampler, which the others are compared with.
+UNIFORM = "uniform"
+
+#: The sampler of a network: the bundled model, unless another one is given.
+LEARNED = "learned"
+
+#: Names of the samplers; "uniform" is OMPL's own, untouched.
+SAMPLERS = (LEARNED, UNIFORM, "corridor", "straight-line")
+
+#: What a result names its sampler when the caller brought the heat map.
+OWN_HEATMAP = "heatmap"
+
+#: Makes the heat map of a map, a start and a goal.
+HeatmapSource = Callable[[GridMap, ArrayLike, ArrayLike], Heatmap]
+
+
+def heatmap_source(
+    sampler: str,
+    model: Predictor | str | PathLike[str] | None = None,
+    heatmap: Heatmap | ArrayLike | None = None,
+) -> tuple[str, HeatmapSource | None]:
+    """Return the name of a sampler, and what makes its heat map; a model is loaded here, once.
+
+    Args:
+        sampler: one of :data:`SAMPLERS`.
+        model: for the learned sampler, a loaded model or the file of one; the bundled model by
+            default.
+        heatmap: to be sampled in place of the learned one.
+
+    Returns:
+        The name, and the source; None for OMPL's own sampler, which has no heat map.
+
+    Raises:
+        ConfigError: an unknown sampler, or options that do not go together.
+        ModelError: an unusable model file.
+    """
+    if sampler not in SAMPLERS:
+        raise ConfigError(f"there is no sampler {sampler!r}; there are {', '.join(SAMPLERS)}")
+    if sampler != LEARNED and (model is not None or heatmap is not None):
+        raise ConfigError(
+            f"the {sampler} sampler uses no model and no heat map: leave them out, or choose the "
+            "learned sampler"
+        )
+    if model is not None and heatmap is not None:
+        raise ConfigError("a model and a heat map were both given: choose one")
+    if heatmap is not None:
+        values = heatmap.values if isinstance(heatmap, Heatmap) else heatmap
+        return OWN_HEATMAP, lambda grid, start, goal: Heatmap(values, grid)
+    if sampler == LEARNED:
+        from ..inference.predictor import Predictor, load_model
+
+        return sampler, (model if isinstance(model, Predictor) else load_model(model)).predict
+    sources = {"corridor": Heatmap.corridor, "straight-line": Heatmap.straight_line}
+    return sampler, sources.get(sampler)

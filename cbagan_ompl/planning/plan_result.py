@@ -1,0 +1,84 @@
+"""What comes out of a plan."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..sampling.heatmap import Heatmap
+
+
+@dataclass(frozen=True)
+class PlanResult:
+    """What came out of :func:`cbagan_ompl.plan`; lengths in world units, times in seconds.
+
+    Attributes:
+        solved: the planner found an exact solution, and every edge of it passed the check again.
+        status: OMPL's own word on the run.
+        planner: OMPL's name of the planner.
+        sampler: ``"learned"``, ``"uniform"``, ``"corridor"``, ``"straight-line"`` or
+            ``"heatmap"`` (the caller's own).
+        hook: by which hook the planner was reached; None for the uniform sampler.
+        ompl_version: of the installed package.
+        seed: what makes the samples of this run again.
+        map: name of the map.
+        start: (x, y).
+        goal: (x, y).
+        goal_tolerance: how far from the goal a path may end.
+        path: (N, 2); empty when not solved.
+        cost: length of the path; infinite when not solved.
+        inference_s: making the heat map and attaching it, loading the model not included.
+        planning_s: inside the planner's ``solve``.
+        simplify_s: inside OMPL's path simplifier.
+        total_s: the sum of the three.
+        first_solution_s: planning time to the first solution; None when not solved or the
+            planner does not let it be known.
+        progress: (planning time, cost) of each better solution that the planner came upon, (K, 2);
+            empty for planners that do not tell the cost of their best solution.
+        iterations: evaluations of the termination condition, about one per iteration; None for
+            planners that take no Python termination condition.
+        nodes: states in the planner's tree or roadmap.
+        sample_counts: ``{"learned": n, "uniform": m}`` samples that the planner had from the heat
+            map's hook; both 0 for the uniform sampler, which has no hook.
+        heatmap: what was sampled; None for the uniform sampler. Not part of the JSON.
+        tree: edges of the planner's tree, (M, 2, 2), when asked for. Not part of the JSON.
+
+    Example: see :func:`cbagan_ompl.plan`, which returns it.
+    """
+
+    solved: bool
+    status: str
+    planner: str
+    sampler: str
+    hook: str | None
+    ompl_version: str
+    seed: int
+    map: str
+    start: NDArray[np.float64]
+    goal: NDArray[np.float64]
+    goal_tolerance: float
+    path: NDArray[np.float64]
+    cost: float
+    inference_s: float
+    planning_s: float
+    simplify_s: float
+    total_s: float
+    first_solution_s: float | None
+    progress: NDArray[np.float64]
+    iterations: int | None
+    nodes: int
+    sample_counts: dict[str, int]
+    heatmap: Heatmap | None = field(repr=False, metadata={"json": False})
+    tree: NDArray[np.float64] | None = field(repr=False, metadata={"json": False})
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the result as JSON-ready values; an infinite cost becomes None."""
+        values = {
+            f.name: getattr(self, f.name) for f in fields(self) if f.metadata.get("json", True)
+        }
+        arrays = {k: v.tolist() for k, v in values.items() if isinstance(v, np.ndarray)}
+        return values | arrays | {"cost": self.cost if isfinite(self.cost) else None}
