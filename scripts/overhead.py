@@ -15,12 +15,12 @@ import argparse
 import numpy as np
 from tqdm import trange
 
-from cbagan_ompl import GridMap, tasks_of
+from cbagan_ompl import GridMap, SamplerOptions, tasks_of
 from cbagan_ompl.benchmarking.logs import parse_log
 from cbagan_ompl.planning import compat
 from cbagan_ompl.planning.compat import og, ou
 from cbagan_ompl.planning.ompl_benchmark import PlannerVariant, RunOptions, run_benchmark
-from cbagan_ompl.planning.problem import Endpoints, simple_setup
+from cbagan_ompl.planning.problem import Endpoints, make_setup
 
 MAP, RANGE = "bundled:walls_with_gaps", 20.0
 
@@ -45,7 +45,7 @@ def main() -> None:
 
 
 def inside(grid: GridMap, task: Endpoints, time: float, seed: int) -> tuple[int, float]:
-    options = RunOptions(1, time, RANGE, grid.resolution, seed=seed)
+    options = RunOptions(1, time, RANGE, grid.resolution, SamplerOptions(seed=seed))
     recording = run_benchmark(
         "x", grid, task, [PlannerVariant("RRTstar", "uniform", None)], options
     )
@@ -56,7 +56,7 @@ def inside(grid: GridMap, task: Endpoints, time: float, seed: int) -> tuple[int,
 def outside(grid: GridMap, task: Endpoints, time: float, seed: int) -> int:
     with compat.log_level(ou.LOG_ERROR):
         compat.seed_ompl(seed)
-        setup = simple_setup(grid, task, grid.resolution)
+        setup = make_setup(grid, task, grid.resolution)
         planner = og.RRTstar(setup.getSpaceInformation())
         planner.setRange(RANGE)
         setup.setPlanner(planner)

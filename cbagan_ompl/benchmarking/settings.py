@@ -74,11 +74,10 @@ class Settings:
         positive_number("time", self.time)
         if self.range is not None:
             positive_number("range", self.range)
-        if not isinstance(self.sampler_options.seed, int):
-            raise ConfigError(
-                f"the seed of a benchmark is an int, got {self.sampler_options.seed!r}"
-            )
-        check_at_least("seed", self.seed, 0)
+        seed = self.sampler_options.seed
+        if not isinstance(seed, int):
+            raise ConfigError(f"the seed of a benchmark must be an int, got {seed!r}")
+        check_at_least("seed", seed, 0)
         whole_number("within", self.within, 1)
         for planner in self.parameters:
             if planner not in self.planners:

@@ -5,7 +5,11 @@ import pytest
 from helpers.benchmarks import Finished
 from helpers.logs import NO_DRAWS, make_log, solved, unsolved
 
-from cbagan_ompl.benchmarking.measures import cost_history, logged_costs
+from cbagan_ompl.benchmarking.measures import (
+    cost_history,
+    logged_costs,
+    thresholds,
+)
 from cbagan_ompl.planning.ompl_benchmark import RunRecord
 
 
@@ -68,3 +72,12 @@ def test_measures_of_runs_agree(finished: Finished) -> None:
                     assert 0 < float(run["first solution time REAL"]) <= float(run["time REAL"])
                     assert float(run["cost at 100 ms REAL"]) == pytest.approx(cost)
                 assert int(run["collision checks INTEGER"]) > int(run["graph states INTEGER"]) / 2
+
+
+def test_the_users_threshold_has_a_property_of_its_own() -> None:
+    run = solved((0.1, 150.0), (0.3, 118.0), (0.7, 101.0))
+    log = make_log("m", {"RRTstar_learned": [run]}, 100.0, thresholds(20))
+    properties = log.planners[0].runs[0]
+    assert properties["time to 20 percent REAL"] == "0.3"
+    assert properties["time to 10 percent REAL"] == "0.7"
+    assert properties["time to 2 percent REAL"] == "0.7"

@@ -25,18 +25,20 @@ SUITES = Path(__file__).resolve().parents[2] / "benchmarks" / "suites"
 
 
 def test_resume_runs_only_what_is_missing(
-    finished: Finished, capsys: pytest.CaptureFixture[str]
+    finished: Finished, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    first, second = sorted(finished.folder.glob("logs/*.log"))
+    folder = shutil.copytree(finished.folder, tmp_path / "out")
+    arguments = [*finished.arguments[:-1], str(folder)]
+    first, second = sorted(folder.glob("logs/*.log"))
     before = first.stat().st_mtime_ns
     second.unlink()
-    assert main([*finished.arguments, "--resume"]) == 0
+    assert main([*arguments, "--resume"]) == 0
     assert first.stat().st_mtime_ns == before
     assert second.is_file()
     assert "2 tasks" in capsys.readouterr().out
-    assert main(finished.arguments) == 2
+    assert main(arguments) == 2
     assert "--resume" in capsys.readouterr().err
-    assert main([*finished.arguments, "--resume", "--runs", "4"]) == 2
+    assert main([*arguments, "--resume", "--runs", "4"]) == 2
     assert "other options" in capsys.readouterr().err
 
 

@@ -28,7 +28,8 @@ def make_log(
         for planner, runs in records.items()
     )
     log = ExperimentLog(
-        "OMPL version 2.0.1", name, {"map VARCHAR": name, "map family VARCHAR": "test"}, "host", "2000-01-01 00:00:00",
+        "OMPL version 2.0.1", name, {"map VARCHAR": name, "map family VARCHAR": "test"},
+        "host", "2000-01-01 00:00:00",
         "Properties\nof the space", "", "7", 1.0, 100.0, len(next(iter(records.values()))), 5.0,
         (("status", "Unknown status", "Exact solution"),), planners,
     )  # fmt: skip

@@ -21,7 +21,7 @@ from cbagan_ompl import (
 )
 from cbagan_ompl.planning import compat, hooks
 from cbagan_ompl.planning.compat import ob, og, ou
-from cbagan_ompl.sampling.adaptation import NO_ADAPTATION
+from cbagan_ompl.sampling.options import NO_ADAPTATION
 
 # Planners that the README's table of hooks promises, by whether StateSamplers can be set.
 ALWAYS = {"RRT", "RRTstar", "InformedRRTstar", "SORRTstar", "PRM", "PRMstar", "BKPIECE1"}
@@ -93,13 +93,13 @@ def test_planner_draws_from_the_heatmap(
 ) -> None:
     compat.seed_ompl(1)
     setup = make_setup(two_walls, planner)
-    with attach(setup, corridor, seed=1) as link:
-        assert link.hook == reached_planners()[planner]
+    with attach(setup, corridor, seed=1) as attachment:
+        assert attachment.hook == reached_planners()[planner]
         status = setup.solve(0.4)
-        assert link.sample_counts["learned"] > 20
+        assert attachment.sample_counts["learned"] > 20
         # STRIDE draws around its nodes, half of which lie where the heat map is 0.
         least = 0.5 if planner == "STRIDE" else 1.0
-        assert link.sample_counts["learned"] > least * link.sample_counts["uniform"]
+        assert attachment.sample_counts["learned"] > least * attachment.sample_counts["uniform"]
         if compat.is_exact(status):
             path = compat.path_positions(setup.getSolutionPath())
             assert two_walls.path_is_free(path)
@@ -110,14 +110,18 @@ def test_planner_draws_from_the_heatmap(
 def test_nearly_all_samples_are_ours(two_walls: GridMap, corridor: Heatmap, planner: str) -> None:
     compat.seed_ompl(2)
     setup = make_setup(two_walls, planner)
-    with attach(setup, corridor, 0.1, seed=2, adaptation=NO_ADAPTATION) as link:
+    with attach(setup, corridor, seed=2, adaptation=NO_ADAPTATION) as attachment:
         condition, iterations = until(lambda: False, limit=1500)
         setup.solve(condition)
-        share = sum(link.sample_counts.values()) / iterations[0]
+        share = sum(attachment.sample_counts.values()) / iterations[0]
         assert share >= 0.8
-        if link.hook == "goal-injection":
+        if attachment.hook == "goal-injection":
             assert share <= 1
-        assert 0.85 < link.sample_counts["learned"] / sum(link.sample_counts.values()) < 0.95
+        assert (
+            0.85
+            < attachment.sample_counts["learned"] / sum(attachment.sample_counts.values())
+            < 0.95
+        )
 
 
 def has_solution(planner: Any) -> bool:
@@ -130,13 +134,15 @@ def first_solutions(grid: GridMap, planner: str, heatmap: Heatmap | None) -> np.
     for seed in range(60):
         compat.seed_ompl(seed)
         setup = make_setup(grid, planner)
-        link = None if heatmap is None else attach(setup, heatmap, 1.0, seed)
+        attachment = (
+            None if heatmap is None else attach(setup, heatmap, uniform_fraction=1.0, seed=seed)
+        )
         condition, count = until(partial(has_solution, setup.getPlanner()))
         assert compat.is_exact(setup.solve(condition))
         iterations.append(count[0])
-        if link is not None:
-            assert link.sample_counts["learned"] == 0
-            link.detach()
+        if attachment is not None:
+            assert attachment.sample_counts["learned"] == 0
+            attachment.detach()
     return np.array(iterations)
 
 
@@ -164,11 +170,11 @@ def test_informed_costs_match_plain_ompl(two_walls: GridMap) -> None:
             setup = make_setup(two_walls, "InformedRRTstar")
             planner = setup.getPlanner()
             uniform = Heatmap.uniform(two_walls)
-            link = attach(setup, uniform, 1.0, seed) if hooked else None
+            attachment = attach(setup, uniform, uniform_fraction=1.0, seed=seed) if hooked else None
             setup.solve(until(lambda: False, limit=2500)[0])
             costs[hooked].append(compat.best_cost(planner))
-            if link is not None:
-                link.detach()
+            if attachment is not None:
+                attachment.detach()
     plain, ours = np.median(costs[False]), np.median(costs[True])
     assert abs(ours - plain) < 0.01 * plain
 
@@ -180,11 +186,13 @@ def test_simplified_path_still_ends_in_the_goal(
     for seed in range(5):
         compat.seed_ompl(seed)
         setup = make_setup(two_walls, planner)
-        with attach(setup, corridor, seed=seed) as link:
+        with attach(setup, corridor, seed=seed) as attachment:
             setup.solve(until(lambda: False, limit=1500)[0])
-            draws = link.sample_counts
+            counts = attachment.sample_counts
             setup.simplifySolution()
-            assert link.sample_counts == draws, "the simplifier asks the goal, not the heat map"
+            assert attachment.sample_counts == counts, (
+                "the simplifier asks the goal, not the heat map"
+            )
             assert np.hypot(*(path_end(setup) - GOAL)) <= 2.0
 
 
@@ -198,24 +206,24 @@ def test_solve_again_and_detach(two_walls: GridMap, corridor: Heatmap, planner: 
         if hasattr(instance, getter)
     ]
     before = [getter() for getter in settings]
-    link = attach(setup, corridor, seed=0)
+    attachment = attach(setup, corridor, seed=0)
     seen = 0
     for _ in range(3):
         setup.clear()
         setup.solve(0.15)
-        assert link.sample_counts["learned"] > seen, "each run draws"
-        seen = link.sample_counts["learned"]
+        assert attachment.sample_counts["learned"] > seen, "each run draws"
+        seen = attachment.sample_counts["learned"]
     if planner == "InformedRRTstar":
         setup.solve(0.1)
-        assert link.sample_counts["learned"] > seen, "a run that goes on draws"
-    link.detach()
-    link.detach()
-    seen = link.sample_counts["learned"]
+        assert attachment.sample_counts["learned"] > seen, "a run that goes on draws"
+    attachment.detach()
+    attachment.detach()
+    seen = attachment.sample_counts["learned"]
     assert [getter() for getter in settings] == before
     assert setup.getGoal().getThreshold() == 2.0
     setup.clear()
     assert setup.solve(0.5)
-    assert link.sample_counts["learned"] == seen, "after detach the planner is plain OMPL's"
+    assert attachment.sample_counts["learned"] == seen, "after detach the planner is plain OMPL's"
     assert np.hypot(*(path_end(setup) - GOAL)) <= 2.0
 
 
@@ -229,11 +237,11 @@ def test_poses(two_walls: GridMap, corridor: Heatmap, kind: str, planner: str) -
     bounds.setHigh(256.0)
     space.setBounds(bounds)
     setup = make_setup(two_walls, planner, space)
-    with attach(setup, corridor, seed=0) as link:
+    with attach(setup, corridor, seed=0) as attachment:
         setup.solve(0.4)
         # PRM ends with its first path, after a few dozen draws.
-        assert link.sample_counts["learned"] > (10 if planner == "PRM" else 50)
-        assert link.sample_counts["learned"] > link.sample_counts["uniform"]
+        assert attachment.sample_counts["learned"] > (10 if planner == "PRM" else 50)
+        assert attachment.sample_counts["learned"] > attachment.sample_counts["uniform"]
         path = setup.getSolutionPath()
         yaws = [path.getState(i).getYaw() for i in range(path.getStateCount())]
         assert path.getStateCount() < 3 or np.std(yaws) > 0.01
@@ -291,9 +299,9 @@ def test_subclass_of_a_planner_is_known_by_its_base(two_walls: GridMap, corridor
     instance = MyRRT(setup.getSpaceInformation())
     instance.setRange(20.0)
     setup.setPlanner(instance)
-    with attach(setup, corridor, seed=0) as link:
+    with attach(setup, corridor, seed=0) as attachment:
         setup.solve(0.2)
-        assert link.sample_counts["learned"] > 20
+        assert attachment.sample_counts["learned"] > 20
 
 
 @pytest.mark.parametrize("planner", ["RRT", "RRTstar"])
@@ -317,18 +325,18 @@ def test_same_seed_same_poses(two_walls: GridMap, corridor: Heatmap, planner: st
 
 
 @pytest.mark.skipif(not compat.HAS_STATE_SAMPLER_ALLOCATOR, reason="not reached by this build")
-@pytest.mark.parametrize("planner", sorted(hooks.KEEP_SAMPLER))
+@pytest.mark.parametrize("planner", sorted(filter(hooks.keeps_sampler, hooks.PLANNERS)))
 def test_planners_that_keep_their_sampler_are_reached_when_set_up(
     two_walls: GridMap, corridor: Heatmap, planner: str
 ) -> None:
     setup = make_setup(two_walls, planner)
     setup.setup()
-    with attach(setup, corridor, seed=0) as link:
+    with attach(setup, corridor, seed=0) as attachment:
         setup.solve(0.1)
-        seen = link.sample_counts
+        seen = attachment.sample_counts
         assert seen["learned"] > 20
     setup.solve(0.1)
-    assert link.sample_counts == seen, "after detach the planner is plain OMPL's"
+    assert attachment.sample_counts == seen, "after detach the planner is plain OMPL's"
 
 
 @pytest.mark.parametrize("planner", ["RRT", "RRTstar", "InformedRRTstar", "PRM"])
@@ -336,37 +344,37 @@ def test_attach_after_a_solve(two_walls: GridMap, corridor: Heatmap, planner: st
     """Samplers and solutions of an earlier run do not keep the planner from drawing."""
     setup = make_setup(two_walls, planner)
     setup.solve(0.1)
-    with attach(setup, corridor, seed=0) as link:
+    with attach(setup, corridor, seed=0) as attachment:
         setup.solve(0.2)
-        assert link.sample_counts["learned"] > 20
+        assert attachment.sample_counts["learned"] > 20
 
 
 def test_attach_with_informed_sampling_of_rrtstar(two_walls: GridMap, corridor: Heatmap) -> None:
     setup = make_setup(two_walls, "RRTstar")
     setup.getPlanner().setInformedSampling(True)
-    with attach(setup, corridor, seed=0) as link:
+    with attach(setup, corridor, seed=0) as attachment:
         setup.solve(0.2)
-        assert link.sample_counts["learned"] > 20
+        assert attachment.sample_counts["learned"] > 20
     assert setup.getPlanner().getInformedSampling()
 
 
 def test_attach_twice_is_refused(two_walls: GridMap, corridor: Heatmap) -> None:
     setup = make_setup(two_walls, "RRTstar")
-    link = attach(setup, corridor)
+    attachment = attach(setup, corridor)
     with pytest.raises(PlannerError, match="detach"):
         attach(setup, corridor)
-    link.detach()
+    attachment.detach()
     attach(setup, corridor).detach()
 
 
 def test_planner_cleared_alone_draws_again(two_walls: GridMap, corridor: Heatmap) -> None:
     setup = make_setup(two_walls, "RRT")
-    with attach(setup, corridor, seed=0) as link:
+    with attach(setup, corridor, seed=0) as attachment:
         setup.solve(0.5)
-        seen = link.sample_counts["learned"]
+        seen = attachment.sample_counts["learned"]
         setup.getPlanner().clear()
         assert compat.is_exact(setup.solve(2.0))
-        assert link.sample_counts["learned"] > seen
+        assert attachment.sample_counts["learned"] > seen
 
 
 @pytest.mark.parametrize("planner", ["RRT", "InformedRRTstar"])
@@ -374,13 +382,13 @@ def test_detach_leaves_a_new_goal_alone(
     two_walls: GridMap, corridor: Heatmap, planner: str
 ) -> None:
     setup = make_setup(two_walls, planner)
-    link = attach(setup, corridor)
+    attachment = attach(setup, corridor)
     setup.solve(0.1)
     setup.clear()
     space = setup.getStateSpace()
     new = make_state(space, 10.0, 40.0)
     setup.setGoalState(new, 2.0)
-    link.detach()
+    attachment.detach()
     assert compat.is_exact(setup.solve(1.0))
     assert np.hypot(*(path_end(setup) - (10, 40))) <= 2
 
@@ -411,8 +419,8 @@ def test_several_starts_and_goals(two_walls: GridMap, corridor: Heatmap) -> None
     for goal in keep:
         goals.addState(goal)
     setup.setGoal(goals)
-    with attach(setup, corridor, seed=0) as link:
+    with attach(setup, corridor, seed=0) as attachment:
         assert compat.is_exact(setup.solve(0.5))
-        assert link.sample_counts["learned"] > 100
+        assert attachment.sample_counts["learned"] > 100
         end = path_end(setup)
         assert min(np.hypot(*(end - (x, 240))) for x in (200, 240)) <= 2

@@ -24,6 +24,7 @@ from cbagan_ompl import (
     tasks_of,
 )
 from cbagan_ompl.planning import compat
+from cbagan_ompl.planning.hooks import hangs_on_python_termination
 
 
 def check(result: PlanResult, grid: GridMap) -> None:
@@ -69,7 +70,9 @@ def test_corridor_beats_uniform_where_it_is_hard() -> None:
     medians = {
         sampler: np.median(
             [
-                plan(grid, task.start, task.goal, "RRT", sampler, 10, range=20, seed=seed).nodes
+                plan(
+                    grid, task.start, task.goal, "RRT", sampler, time=10, range=20, seed=seed
+                ).nodes
                 for seed in range(15)
             ]
         )
@@ -82,7 +85,7 @@ def test_corridor_beats_uniform_where_it_is_hard() -> None:
 @pytest.mark.parametrize("planner", ["RRT", "RRTstar", "InformedRRTstar"])
 def test_same_seed_same_plan(two_walls: GridMap, planner: str, sampler: str) -> None:
     runs = [
-        plan(two_walls, START, GOAL, planner, sampler, 30, iterations=700, range=20, seed=seed)
+        plan(two_walls, START, GOAL, planner, sampler, time=30, iterations=700, range=20, seed=seed)
         for seed in (5, 5, 6)
     ]
     np.testing.assert_array_equal(runs[0].path, runs[1].path)
@@ -91,8 +94,8 @@ def test_same_seed_same_plan(two_walls: GridMap, planner: str, sampler: str) -> 
 
 
 def test_seed_is_reported_and_repeats_the_run(two_walls: GridMap) -> None:
-    first = plan(two_walls, START, GOAL, "RRT", "corridor", 10, range=20)
-    again = plan(two_walls, START, GOAL, "RRT", "corridor", 10, range=20, seed=first.seed)
+    first = plan(two_walls, START, GOAL, "RRT", "corridor", time=10, range=20)
+    again = plan(two_walls, START, GOAL, "RRT", "corridor", time=10, range=20, seed=first.seed)
     np.testing.assert_array_equal(first.path, again.path)
 
 
@@ -100,13 +103,15 @@ def test_world_frame(two_walls: GridMap) -> None:
     """The same map in metres, y up and turned: same result, up to the frame."""
     grid = GridMap(two_walls.free, 0.05, (-2.0, 7.0, 0.5))
     start, goal = grid.to_world([START, GOAL])
-    result = plan(grid, start, goal, "RRTstar", "corridor", 1.0, range=1.0, seed=3)
+    result = plan(grid, start, goal, "RRTstar", "corridor", time=1.0, range=1.0, seed=3)
     check(result, grid)
     assert 590 < result.cost / 0.05 < 640
 
 
 def test_radius_keeps_clear_of_obstacles(two_walls: GridMap) -> None:
-    result = plan(two_walls, START, GOAL, "RRTstar", "corridor", 0.7, radius=6, range=20, seed=0)
+    result = plan(
+        two_walls, START, GOAL, "RRTstar", "corridor", time=0.7, radius=6, range=20, seed=0
+    )
     check(result, two_walls.inflated(6))
     blocked = np.argwhere(~two_walls.free)[:, ::-1]
     for start, end in zip(result.path[:-1], result.path[1:], strict=True):
@@ -116,8 +121,10 @@ def test_radius_keeps_clear_of_obstacles(two_walls: GridMap) -> None:
 
 
 def test_simplify_shortens(two_walls: GridMap) -> None:
-    plain = plan(two_walls, START, GOAL, "RRT", "corridor", 5, range=20, seed=2)
-    shorter = plan(two_walls, START, GOAL, "RRT", "corridor", 5, range=20, seed=2, simplify=True)
+    plain = plan(two_walls, START, GOAL, "RRT", "corridor", time=5, range=20, seed=2)
+    shorter = plan(
+        two_walls, START, GOAL, "RRT", "corridor", time=5, range=20, seed=2, simplify=True
+    )
     check(shorter, two_walls)
     assert shorter.cost < 0.97 * plain.cost
     assert shorter.simplify_s > 0
@@ -127,7 +134,16 @@ def test_simplify_shortens(two_walls: GridMap) -> None:
 @pytest.mark.parametrize("planner", ["RRT", "RRTstar", "InformedRRTstar"])
 def test_path_to_the_goal_itself(two_walls: GridMap, planner: str, sampler: str) -> None:
     result = plan(
-        two_walls, START, GOAL, planner, sampler, 5, 1500, range=20, seed=0, goal_tolerance=0
+        two_walls,
+        START,
+        GOAL,
+        planner,
+        sampler,
+        time=5,
+        iterations=1500,
+        range=20,
+        seed=0,
+        goal_tolerance=0,
     )
     check(result, two_walls)
     np.testing.assert_array_equal(result.path[-1], GOAL)
@@ -141,7 +157,9 @@ def test_own_heatmap(two_walls: GridMap, corridor: Heatmap) -> None:
 
 
 def test_unsolved_is_said(two_walls: GridMap) -> None:
-    result = plan(two_walls, START, GOAL, "RRTstar", "uniform", 5, iterations=20, range=5, seed=0)
+    result = plan(
+        two_walls, START, GOAL, "RRTstar", "uniform", time=5, iterations=20, range=5, seed=0
+    )
     assert not result.solved
     assert result.path.shape == (0, 2)
     assert result.first_solution_s is None
@@ -152,11 +170,13 @@ def test_unsolved_is_said(two_walls: GridMap) -> None:
 
 
 def test_json_fields(two_walls: GridMap) -> None:
-    result = plan(two_walls, START, GOAL, "RRT", "corridor", 5, range=20, seed=0, keep_tree=True)
+    result = plan(
+        two_walls, START, GOAL, "RRT", "corridor", time=5, range=20, seed=0, keep_tree=True
+    )
     values = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     assert set(values) >= {
         "solved", "planner", "sampler", "hook", "ompl_version", "seed", "path", "cost",
-        "inference_s", "planning_s", "total_s", "nodes", "draws", "first_solution_s",
+        "inference_s", "planning_s", "total_s", "nodes", "sample_counts", "first_solution_s",
     }  # fmt: skip
     assert not {"tree", "heatmap"} & set(values)
     assert set(values["sample_counts"]) == {"learned", "uniform"}
@@ -227,8 +247,8 @@ def test_heatmap_of_another_map(two_walls: GridMap) -> None:
 
 def test_numpy_scalars_are_numbers(two_walls: GridMap) -> None:
     result = plan(
-        two_walls, START, GOAL, "RRT", "corridor", np.float32(5), np.int64(5000), np.float32(20),
-        seed=np.int64(3), goal_tolerance=np.float32(1),
+        two_walls, START, GOAL, "RRT", "corridor", time=np.float32(5), iterations=np.int64(5000),
+        range=np.float32(20), seed=np.int64(3), goal_tolerance=np.float32(1),
     )  # fmt: skip
     check(result, two_walls)
     json.dumps(result.to_dict(), allow_nan=False)
@@ -236,14 +256,14 @@ def test_numpy_scalars_are_numbers(two_walls: GridMap) -> None:
 
 @pytest.mark.parametrize("planner", sorted(compat.planner_names() - {"BITstar"}))
 def test_every_planner_comes_back(two_walls: GridMap, planner: str) -> None:
-    result = plan(two_walls, START, GOAL, planner, "uniform", 0.3, seed=1)
+    result = plan(two_walls, START, GOAL, planner, "uniform", time=0.3, seed=1)
     assert result.planning_s < 2
     if result.solved:
         check(result, two_walls)
 
 
 def test_prm_and_iterations(two_walls: GridMap) -> None:
-    if "PRM" in compat.HANGS_ON_PYTHON_TERMINATION:
+    if hangs_on_python_termination("PRM"):
         with pytest.raises(ConfigError, match=r"PRM .*cannot be limited by iterations"):
             plan(two_walls, START, GOAL, "PRM", "uniform", iterations=10)
 

@@ -1,4 +1,4 @@
-"""How far draws follow the heat map, on their own and inside planners."""
+"""How far samples follow the heat map, on their own and inside planners."""
 
 from __future__ import annotations
 
@@ -6,33 +6,36 @@ from math import inf
 
 import numpy as np
 import pytest
+from helpers.monitors import FakeMonitor
 from helpers.tasks import GOAL, START
 
 from cbagan_ompl import ConfigError, GridMap, Heatmap, plan
-from cbagan_ompl.sampling.adaptation import FULL_ADAPTATION, NO_ADAPTATION, Adaptation, Tree, Trust
+from cbagan_ompl.sampling.adaptation import AdaptiveMixture, TreeCoverage
+from cbagan_ompl.sampling.options import FULL_ADAPTATION, NO_ADAPTATION, Adaptation
 from cbagan_ompl.sampling.sampler import HeatmapSampler
 
 
-def make_trust(
+def make_mixture(
     heatmap: Heatmap, adaptation: Adaptation = FULL_ADAPTATION, nodes: int = 10**9
-) -> tuple[Trust, list[float]]:
-    """A trust, and the shares that it sets, the latest one last."""
-    shares = [1.0]
-    trust = Trust(heatmap, adaptation, 16.0, lambda: nodes, shares.append)
-    return trust, shares
+) -> tuple[AdaptiveMixture, list[float]]:
+    """A mixture, and the fractions that it sets, the latest one last."""
+    monitor = FakeMonitor(nodes=nodes)
+    return AdaptiveMixture(heatmap, adaptation, 16.0, monitor), monitor.fractions
 
 
-def adapted(heatmap: Heatmap, trust: Trust) -> HeatmapSampler:
-    stream = HeatmapSampler(heatmap, 0.1, seed=0)
-    stream.adapt(trust)
-    return stream
+def adapted(heatmap: Heatmap, mixture: AdaptiveMixture) -> HeatmapSampler:
+    return HeatmapSampler(heatmap, seed=0, mixture=mixture)
+
+
+def learned(sampler: HeatmapSampler) -> int:
+    return sampler.sample_counts["learned"]
 
 
 def test_a_node_covers_no_more_than_its_clearance(two_walls: GridMap) -> None:
-    tree = Tree(two_walls, reach=16.0)
+    tree = TreeCoverage(two_walls, reach=16.0)
 
     def covers(x: float, y: float) -> bool:
-        return tree.cells[int(y) * 256 + int(x)] == 1
+        return tree.mask[int(y) * 256 + int(x)] == 1
 
     assert tree.add(100.0, 53.0) == 53 * 256 + 100
     assert covers(105.0, 50.0)
@@ -43,101 +46,102 @@ def test_a_node_covers_no_more_than_its_clearance(two_walls: GridMap) -> None:
     assert covers(184.5, 126.5)
     assert not covers(180.0, 110.0), "farther than the reach"
     assert tree.add(-3.0, 500.0) is None
-    assert tree.nodes == 4
+    assert tree.node_count == 4
     tree.clear()
     assert not covers(100.0, 53.0)
 
 
-def test_before_the_first_path_draws_go_where_the_tree_is_not(corridor: Heatmap) -> None:
-    trust, _ = make_trust(corridor, Adaptation.of(["coverage"]))
-    stream = adapted(corridor, trust)
+def test_before_the_first_path_samples_go_where_the_tree_is_not(corridor: Heatmap) -> None:
+    mixture, _ = make_mixture(corridor, Adaptation.of(["coverage"]))
+    sampler = adapted(corridor, mixture)
     for x in range(5, 256, 5):
         for y in range(5, 60, 5):
-            trust.grown(float(x), float(y), arrived=False)
-    before = stream.learned
-    points = np.array([stream.next() for _ in range(2000)])
-    learned = stream.learned - before
-    assert learned > 1500
-    assert (points[:, 1] < 52).mean() < 0.1, "uniform draws alone"
+            mixture.on_new_node(float(x), float(y), in_goal=False)
+    before = learned(sampler)
+    points = np.array([sampler.next() for _ in range(2000)])
+    assert learned(sampler) - before > 1500
+    assert (points[:, 1] < 52).mean() < 0.1, "uniform samples alone"
 
 
-def test_a_region_full_of_tree_leaves_uniform_draws(corridor: Heatmap) -> None:
-    trust, _ = make_trust(corridor, Adaptation.of(["coverage"]))
-    stream = adapted(corridor, trust)
+def test_a_region_full_of_tree_leaves_uniform_samples(corridor: Heatmap) -> None:
+    mixture, _ = make_mixture(corridor, Adaptation.of(["coverage"]))
+    sampler = adapted(corridor, mixture)
     for x in np.arange(2.0, 256, 2):
         for y in np.arange(2.0, 256, 2):
-            trust.grown(x, y, arrived=False)
+            mixture.on_new_node(x, y, in_goal=False)
     for _ in range(500):
-        stream.next()
-    assert stream.learned < 20
+        sampler.next()
+    assert learned(sampler) < 20
 
 
-def test_after_a_path_draws_follow_the_whole_region(corridor: Heatmap) -> None:
-    trust, _ = make_trust(corridor)
-    stream = adapted(corridor, trust)
+def test_after_a_path_samples_follow_the_whole_region(corridor: Heatmap) -> None:
+    mixture, _ = make_mixture(corridor)
+    monitor = FakeMonitor(best_cost=lambda: 700.0)
+    sampler = HeatmapSampler(corridor, monitor=monitor, mixture=mixture, seed=0)
     for x in np.arange(2.0, 256, 2):
         for y in np.arange(2.0, 256, 2):
-            trust.grown(x, y, arrived=False)
-    stream.follow(lambda: 700.0, lambda: None)
+            mixture.on_new_node(x, y, in_goal=False)
     for _ in range(1000):
-        stream.next()
-    assert 0.87 < stream.learned / 1000 < 0.93
+        sampler.next()
+    assert 0.87 < learned(sampler) / 1000 < 0.93
 
 
-def test_draws_in_vain_cost_the_heat_map_its_share(corridor: Heatmap) -> None:
-    trust, shares = make_trust(corridor, Adaptation.of(["patience"]))
+def test_samples_in_vain_cost_the_heat_map_its_fraction(corridor: Heatmap) -> None:
+    mixture, fractions = make_mixture(corridor, Adaptation.of(["stagnation"]))
     for _ in range(127):
-        trust.drawn()
-    assert shares == [1.0]
-    trust.drawn()
-    assert shares[-1] == 0.5
+        mixture.on_sample()
+    assert fractions == [1.0]
+    mixture.on_sample()
+    assert fractions[-1] == 0.5
     for _ in range(1000):
-        trust.drawn()
-    assert shares[-1] == 0.25
+        mixture.on_sample()
+    assert fractions[-1] == 0.25
     row, column = np.argwhere(corridor.region)[0]
-    trust.grown(column + 0.5, row + 0.5, arrived=False)
-    assert shares[-1] == 1.0, "new ground in the region restores it"
+    mixture.on_new_node(column + 0.5, row + 0.5, in_goal=False)
+    assert fractions[-1] == 1.0, "new ground in the region restores it"
     for _ in range(1000):
-        trust.drawn()
+        mixture.on_sample()
     row, column = np.argwhere(corridor.grid.free & (corridor.values == 0))[0]
-    trust.grown(column + 0.5, row + 0.5, arrived=False)
-    assert shares[-1] == 0.25, "new ground elsewhere does not"
-    trust.improved()
-    assert shares[-1] == 1.0, "there is a path"
+    mixture.on_new_node(column + 0.5, row + 0.5, in_goal=False)
+    assert fractions[-1] == 0.25, "new ground elsewhere does not"
+    mixture.on_solution()
+    assert fractions[-1] == 1.0, "there is a path"
 
 
-def test_a_region_that_joins_nothing_is_doubted(corridor: Heatmap) -> None:
-    for adaptation, joined, share in (
+def test_a_region_that_connects_nothing_is_sampled_less(corridor: Heatmap) -> None:
+    for adaptation, connected, fraction in (
         (FULL_ADAPTATION, False, 0.15),
         (FULL_ADAPTATION, True, 1.0),
         (NO_ADAPTATION, False, 1.0),
     ):
-        trust, shares = make_trust(corridor, adaptation)
-        trust.begin(joined)
-        assert shares[-1] == share
-        if not joined:
+        mixture, fractions = make_mixture(corridor, adaptation)
+        mixture.on_start(connected)
+        assert fractions[-1] == fraction
+        if not connected:
             for _ in range(1000):
-                trust.drawn()
-            assert shares[-1] == share, "nothing was followed that could change it"
+                mixture.on_sample()
+            assert fractions[-1] == fraction, "nothing was watched that could change it"
 
 
 def test_a_cleared_tree_is_noticed(corridor: Heatmap) -> None:
-    trust, _ = make_trust(corridor, nodes=0)
-    trust.grown(20.0, 20.0, arrived=False)
-    assert any(trust.spent)
-    trust.blocked()
-    trust.blocked()
-    assert not any(trust.spent)
-    again, _ = make_trust(corridor)
-    again.grown(20.0, 20.0, arrived=True)
-    again.grown(100.0, 100.0, arrived=False)  # a planner that stops at its first path starts anew
-    assert not again.spent[20 * 256 + 20]
-    assert again.spent[100 * 256 + 100]
+    mixture, _ = make_mixture(corridor, nodes=0)
+    mixture.on_new_node(20.0, 20.0, in_goal=False)
+    assert any(mixture.covered)
+    mixture.on_exhausted()
+    mixture.on_exhausted()
+    assert not any(mixture.covered)
+    again, _ = make_mixture(corridor)
+    again.on_new_node(20.0, 20.0, in_goal=True)
+    again.on_new_node(
+        100.0, 100.0, in_goal=False
+    )  # a planner that stops at its first path starts anew
+    assert not again.covered[20 * 256 + 20]
+    assert again.covered[100 * 256 + 100]
 
 
-def test_unknown_parts_are_refused() -> None:
-    with pytest.raises(ConfigError, match=r"'hope'.*doubt, coverage, patience"):
-        Adaptation.of(["doubt", "hope"])
+def test_unknown_rules_raise() -> None:
+    with pytest.raises(ConfigError, match=r"'hope'.*connectivity, coverage, stagnation"):
+        Adaptation.of(["connectivity", "hope"])
 
 
 def wrong_heatmaps(grid: GridMap, right: Heatmap) -> dict[str, np.ndarray]:
@@ -187,7 +191,7 @@ def test_coverage_saves_nodes(two_walls: GridMap, corridor: Heatmap) -> None:
 
 
 @pytest.mark.parametrize("planner", ["RRTstar", "InformedRRTstar"])
-def test_the_simplifier_gets_the_true_goal_where_few_draws_are_ours(planner: str) -> None:
+def test_the_simplifier_gets_the_true_goal_where_few_samples_are_ours(planner: str) -> None:
     free = np.ones((64, 64), bool)
     free[20:44, 32] = False
     grid = GridMap(free)
@@ -200,7 +204,7 @@ def test_the_simplifier_gets_the_true_goal_where_few_draws_are_ours(planner: str
         assert result.solved, seed
 
 
-def test_points_outside_are_not_joined(corridor: Heatmap) -> None:
+def test_points_outside_are_not_connected(corridor: Heatmap) -> None:
     assert corridor.connects(START, GOAL)
     assert not corridor.connects(START, (256.0, 5.0))
     assert not corridor.connects(START, (-3.0, 5.0))

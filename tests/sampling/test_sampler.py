@@ -4,21 +4,23 @@ from math import inf
 
 import numpy as np
 import pytest
+from helpers.monitors import FakeMonitor
 from helpers.tasks import GOAL, START
 
 from cbagan_ompl import ConfigError, GridMap, Heatmap
-from cbagan_ompl.sampling.sampler import HeatmapSampler, InformedSet
+from cbagan_ompl.sampling.informed_set import InformedSet
+from cbagan_ompl.sampling.sampler import HeatmapSampler
 
 
-def take(stream: HeatmapSampler, n: int) -> np.ndarray:
-    return np.array([stream.next() for _ in range(n)])
+def take(sampler: HeatmapSampler, n: int) -> np.ndarray:
+    return np.array([sampler.next() for _ in range(n)])
 
 
 def test_mixture_and_counts(two_walls: GridMap, corridor: Heatmap) -> None:
-    stream = HeatmapSampler(corridor, 0.3, seed=0)
-    points = take(stream, 20_000)
-    assert sum(stream.sample_counts.values()) == len(points)
-    assert abs(stream.sample_counts["uniform"] / len(points) - 0.3) < 0.02
+    sampler = HeatmapSampler(corridor, uniform_fraction=0.3, seed=0)
+    points = take(sampler, 20_000)
+    assert sum(sampler.sample_counts.values()) == len(points)
+    assert abs(sampler.sample_counts["uniform"] / len(points) - 0.3) < 0.02
     assert two_walls.is_free(points).all()
     columns, rows = points.astype(int).T
     off_corridor = (corridor.values[rows, columns] == 0).mean()
@@ -26,7 +28,7 @@ def test_mixture_and_counts(two_walls: GridMap, corridor: Heatmap) -> None:
     assert abs(off_corridor - 0.3 * empty) < 0.02
 
 
-def test_same_seed_same_draws(corridor: Heatmap) -> None:
+def test_same_seed_same_samples(corridor: Heatmap) -> None:
     first, again = HeatmapSampler(corridor, seed=3), HeatmapSampler(corridor, seed=3)
     np.testing.assert_array_equal(take(first, 3000), take(again, 3000))
     np.testing.assert_array_equal(
@@ -38,10 +40,10 @@ def test_same_seed_same_draws(corridor: Heatmap) -> None:
 @pytest.mark.parametrize("fraction", [0, -0.1, 1.01, float("nan")])
 def test_bad_uniform_fraction(corridor: Heatmap, fraction: float) -> None:
     with pytest.raises(ConfigError, match="uniform_fraction"):
-        HeatmapSampler(corridor, fraction)
+        HeatmapSampler(corridor, uniform_fraction=fraction)
 
 
-@pytest.mark.parametrize("sharpness", [0, -1, float("nan"), inf, "sharp", None])
+@pytest.mark.parametrize("sharpness", [0, -1, float("nan"), inf, "sharp"])
 def test_bad_sharpness(corridor: Heatmap, sharpness: float) -> None:
     with pytest.raises(
         ConfigError, match=f"sharpness is a finite number above 0, got {sharpness!r}"
@@ -49,48 +51,51 @@ def test_bad_sharpness(corridor: Heatmap, sharpness: float) -> None:
         HeatmapSampler(corridor, sharpness=sharpness)
 
 
-@pytest.mark.parametrize(("sharpness", "dim_share"), [(0.5, 1 / 3), (1, 1 / 5), (3, 1 / 65)])
-def test_draws_follow_a_power_of_the_heat_map(sharpness: float, dim_share: float) -> None:
+@pytest.mark.parametrize(("sharpness", "dim_fraction"), [(0.5, 1 / 3), (1, 1 / 5), (3, 1 / 65)])
+def test_samples_follow_a_power_of_the_heat_map(sharpness: float, dim_fraction: float) -> None:
     # Half of the map has a quarter of the heat, and all of it little: only ratios count.
     grid = GridMap(np.ones((40, 40), bool))
     values = np.full(grid.shape, 4e-10)
     values[:, :20] = 1e-10
-    stream = HeatmapSampler(Heatmap(values, grid), 1e-9, seed=0, sharpness=sharpness)
-    assert abs((take(stream, 20_000)[:, 0] < 20).mean() - dim_share) < 0.01
-    near = np.array([stream.near(20, 20, 10) for _ in range(3000)])
-    assert abs((near[:, 0] < 20).mean() - dim_share) < 0.05
+    sampler = HeatmapSampler(
+        Heatmap(values, grid), uniform_fraction=1e-9, seed=0, sharpness=sharpness
+    )
+    assert abs((take(sampler, 20_000)[:, 0] < 20).mean() - dim_fraction) < 0.01
+    near = np.array([sampler.near(20, 20, 10) for _ in range(3000)])
+    assert abs((near[:, 0] < 20).mean() - dim_fraction) < 0.05
 
 
-def test_draws_stay_in_the_box_where_nothing_shortens_the_path(corridor: Heatmap) -> None:
-    stream = HeatmapSampler(corridor, 0.5, seed=0)
+def test_samples_stay_in_the_box_where_nothing_shortens_the_path(corridor: Heatmap) -> None:
+    informed = InformedSet(np.array([START]), np.array([GOAL]), 1.0)
+    monitor = FakeMonitor(lambda: 1.0, informed)
+    sampler = HeatmapSampler(corridor, monitor=monitor, uniform_fraction=0.5, seed=0)
     low, high = np.array(START) - 0.1, np.array(START) + 0.1
-    stream.keep_inside(low, high)
-    stream.follow(lambda: 1.0, lambda: InformedSet(np.array([START]), np.array([GOAL]), 1.0))
-    points = take(stream, 20)
+    sampler.keep_inside(low, high)
+    points = take(sampler, 20)
     assert ((points >= low) & (points <= high)).all()
 
 
-def test_informed_draws_stay_in_the_ellipse(corridor: Heatmap) -> None:
+def test_informed_samples_stay_in_the_ellipse(corridor: Heatmap) -> None:
     costs = iter([inf] * 100 + [900.0] * 5000 + [610.0] * 5000)
     informed = InformedSet(np.array([START]), np.array([GOAL]), tolerance=1.0)
-    stream = HeatmapSampler(corridor, 0.5, seed=0)
-    stream.follow(lambda: next(costs), lambda: informed)
-    points = take(stream, 10_100)
-    through = informed.shortest_through(points)
+    monitor = FakeMonitor(lambda: next(costs), informed)
+    sampler = HeatmapSampler(corridor, monitor=monitor, uniform_fraction=0.5, seed=0)
+    points = take(sampler, 10_100)
+    through = informed.cost_bounds(points)
     assert (through[100:5100] <= 900).all()
     assert (through[5100:] <= 610).all()
-    assert 0.45 < stream.sample_counts["uniform"] / 10_100 < 0.55, "the mixture stays what it was"
+    assert 0.45 < sampler.sample_counts["uniform"] / 10_100 < 0.55, "the mixture stays what it was"
 
 
 def test_no_point_of_a_pixel_is_below_the_bound_of_the_pixel() -> None:
     grid = GridMap(np.ones((12, 20), np.bool_), resolution=0.5, origin=(3.0, -1.0, 0.6))
     corners = grid.to_world([(4.2, 3.1), (15.0, 8.5), (18.7, 2.0)])
     informed = InformedSet(corners[:1], corners[1:], tolerance=0.25)
-    bounds = informed.shortest_through_pixels(grid)
+    bounds = informed.pixel_cost_bounds(grid)
     assert bounds.shape == grid.shape
     pixels = np.random.default_rng(0).random((5000, 2)) * (grid.width, grid.height)
     columns, rows = pixels.astype(int).T
-    above = informed.shortest_through(grid.to_world(pixels)) - bounds[rows, columns]
+    above = informed.cost_bounds(grid.to_world(pixels)) - bounds[rows, columns]
     assert above.min() >= 0
     # Half a diagonal from the centre, and twice that where both distances change together.
     assert above.max() <= 4 * np.sqrt(0.5) * grid.resolution + 1e-9
@@ -98,38 +103,38 @@ def test_no_point_of_a_pixel_is_below_the_bound_of_the_pixel() -> None:
 
 def test_informed_set_is_left_when_the_planner_starts_again(corridor: Heatmap) -> None:
     cost = 400.0
-    stream = HeatmapSampler(Heatmap.uniform(corridor.grid), seed=0)
-    stream.follow(lambda: cost, lambda: InformedSet(np.array([START]), np.array([GOAL]), 1.0))
-    informed = take(stream, 2000)
+    monitor = FakeMonitor(lambda: cost, InformedSet(np.array([START]), np.array([GOAL]), 1.0))
+    sampler = HeatmapSampler(Heatmap.uniform(corridor.grid), monitor=monitor, seed=0)
+    informed = take(sampler, 2000)
     cost = inf
-    again = take(stream, 2000)
+    again = take(sampler, 2000)
     assert np.hypot(*(informed - (10, 240)).T).min() > 30
     assert np.hypot(*(again - (10, 240)).T).min() < 30
 
 
 def test_empty_informed_set_does_not_hang(corridor: Heatmap) -> None:
-    stream = HeatmapSampler(corridor, seed=0)
-    stream.follow(lambda: 1.0, lambda: InformedSet(np.array([START]), np.array([GOAL]), 0.0))
-    assert len(take(stream, 3)) == 3
+    monitor = FakeMonitor(lambda: 1.0, InformedSet(np.array([START]), np.array([GOAL]), 0.0))
+    sampler = HeatmapSampler(corridor, monitor=monitor, seed=0)
+    assert len(take(sampler, 3)) == 3
 
 
-def test_local_draws(two_walls: GridMap, corridor: Heatmap) -> None:
-    stream = HeatmapSampler(corridor, 0.1, seed=0)
-    near = np.array([stream.near(205, 65, 30) for _ in range(2000)])
+def test_local_samples(two_walls: GridMap, corridor: Heatmap) -> None:
+    sampler = HeatmapSampler(corridor, seed=0)
+    near = np.array([sampler.near(205, 65, 30) for _ in range(2000)])
     assert (np.abs(near - (205, 65)) <= 30).all()
-    assert stream.sample_counts["learned"] > 1700
+    assert sampler.sample_counts["learned"] > 1700
     inside = near[two_walls.is_free(near)].astype(int)
     heat = corridor.values[inside[:, 1], inside[:, 0]]
     window = corridor.values[35:95, 175:235][two_walls.free[35:95, 175:235]]
     assert heat.mean() > 2 * window.mean()
 
-    around = np.array([stream.gaussian(205, 65, 10) for _ in range(2000)])
+    around = np.array([sampler.gaussian(205, 65, 10) for _ in range(2000)])
     assert np.abs(around.mean(axis=0) - (205, 65)).max() < 10
     assert around.std(axis=0).max() < 12
 
 
-def test_local_draws_without_heat_are_uniform(corridor: Heatmap) -> None:
-    stream = HeatmapSampler(corridor, 0.1, seed=0)
-    near = np.array([stream.near(20, 240, 10) for _ in range(500)])
-    assert stream.sample_counts == {"learned": 0, "uniform": 500}
+def test_local_samples_without_heat_are_uniform(corridor: Heatmap) -> None:
+    sampler = HeatmapSampler(corridor, seed=0)
+    near = np.array([sampler.near(20, 240, 10) for _ in range(500)])
+    assert sampler.sample_counts == {"learned": 0, "uniform": 500}
     assert near.std(axis=0).min() > 4
