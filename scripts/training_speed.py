@@ -1,8 +1,8 @@
 """How long a training step takes: memory format and precision, next to each other in one run.
 
-    python benchmarks/training_speed.py [--device cuda] [--batch-size 32] [--threads 1]
+    python scripts/training_speed.py [--device cuda] [--batch-size 32] [--threads 1]
 
-The rows take turns, so that all of them meet the same disturbances; the ratio is to the first row.
+The rows take turns, so that all of them meet the same disturbances. Ratios are to the first row.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def step(
     device: torch.device,
     precision: str,
 ) -> float:
-    """Seconds of one forward and backward pass."""
+    """Return the duration of one forward and backward pass, seconds."""
     began = time.perf_counter()
     with torch.autocast(device.type, torch.bfloat16, enabled=precision == "bfloat16"):
         image = generator(*inputs)
@@ -39,13 +39,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--device", default="auto")
     parser.add_argument("--batch-size", type=int, default=32)
-    parser.add_argument("--side", type=int, default=64, help="of the images, pixels")
+    parser.add_argument("--size", type=int, default=64, help="of the images, pixels")
     parser.add_argument("--repeats", type=int, default=10)
     parser.add_argument("--threads", type=int, default=1, help="of the CPU")
     args = parser.parse_args()
     torch.set_num_threads(args.threads)
     device = pick_device(args.device)
-    shape = (args.batch_size, 3, args.side, args.side)
+    shape = (args.batch_size, 3, args.size, args.size)
     rows = {}
     for name, memory_format in FORMATS.items():
         generator = make_generator(TrainingConfig()).to(device, memory_format=memory_format)
