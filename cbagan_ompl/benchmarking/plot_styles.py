@@ -20,7 +20,7 @@ from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from .settings import BASELINE
 
-_PANEL_WIDTH, _LEGEND_WIDTH, _LEGEND_HEIGHT = 3.2, 1.8, 0.45
+_PANEL_WIDTH, _LEGEND_WIDTH, _LEGEND_HEIGHT = 3.2, 1.7, 0.45
 _SMALL = 8  # font size of ticks and legends
 
 # Numbers of columns, from the most wanted one; with one of them at most one cell is left over.
@@ -140,7 +140,9 @@ class Panels:
     def add_note(self, text: str) -> None:
         """Put a note where a legend would be."""
         if self._left_over:
-            self._left_over[0].text(0.5, 0.5, text, ha="center", va="center", fontsize=9)
+            cell = self._left_over[0]
+            center: dict[str, Any] = {"ha": "center", "va": "center", "in_layout": False}
+            cell.text(0.5, 0.5, text, transform=cell.transAxes, fontsize=9, **center)
         else:
             self.figure.supxlabel(text, fontsize=9)
 
