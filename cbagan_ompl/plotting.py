@@ -1,99 +1,133 @@
-"""The picture of a plan: map, heat map, tree, path, start and goal."""
+"""The figure of a plan: map, heat map, tree, path, start and goal, in world coordinates."""
 
 from __future__ import annotations
 
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import FixedFormatter, FixedLocator, MaxNLocator
+from numpy.typing import NDArray
 
-from .errors import ConfigError
+from .common.figures import (
+    BLACK,
+    BLUE,
+    OBSTACLE,
+    UNKNOWN,
+    check_figure_path,
+    mark_endpoints,
+    write_figure,
+)
 from .maps.grid_map import GridMap
 
 if TYPE_CHECKING:
     from .planning.plan_result import PlanResult
 
-# Okabe and Ito's palette, which colour-blind readers can tell apart.
-_TREE, _PATH, _START, _GOAL = "#0072B2", "#000000", "#009E73", "#D55E00"
-_OBSTACLE = "#4d4d4d"
 _INFLATED = "#a6a6a6"
 _HEAT = LinearSegmentedColormap.from_list("heat", ["#ffffff", "#fff0b3", "#f7c948", "#e69f00"])
 
-# Inches: the map's longer side, and the strips for the title and the legend.
-_MAP_SIDE = 7.0
-_MARGIN, _TITLE, _LEGEND = 0.15, 0.65, 0.75
-_DOTS_PER_INCH = 150
+# Inches: the map's longer side, the strips for title, tick labels and legend, and a margin.
+_MAP_SIZE = 7.0
+_TITLE, _TICKS, _LEGEND, _MARGIN = 0.65, 0.5, 0.6, 0.2
+
+# Around the free part of a map, as a fraction of its longer side, and in pixels at least.
+_PADDING, _LEAST_PADDING = 0.03, 3
+
+# Line width of a tree in points: the more edges, the thinner.
+_WIDEST, _THINNEST, _WIDTH_OF_ONE = 0.6, 0.12, 20.0
+
+_MOST_TICKS = 8
 
 
-def save_figure(result: PlanResult, grid: GridMap, path: str | PathLike[str]) -> None:
-    """Draw a plan and save it.
+def save_figure(
+    result: PlanResult, grid: GridMap, path: str | PathLike[str], *, show_tree: bool = True
+) -> None:
+    """Draw a plan and save the figure.
 
     Args:
         result: from :func:`cbagan_ompl.plan`, with ``keep_tree=True`` for its tree.
         grid: the map as loaded, before it was inflated.
         path: the file; its suffix chooses the format (.png, .pdf, .svg, .jpg).
+        show_tree: whether to draw the tree, where the result has one.
 
     Raises:
         ConfigError: a suffix that stands for no known format, or a folder that cannot be
             written to.
+
+    Example:
+        >>> import tempfile
+        >>> from cbagan_ompl import GridMap, plan
+        >>> grid = GridMap.load("bundled:rooms")
+        >>> result = plan(grid, (30, 30), (60, 60), sampler="uniform", time=0.1, seed=0)
+        >>> with tempfile.NamedTemporaryFile(suffix=".png") as file:
+        ...     save_figure(result, grid, file.name)
     """
     check_figure_path(path)
-    figure = draw_plan(result, grid)
-    try:
-        figure.savefig(path, dpi=_DOTS_PER_INCH)
-    except OSError as error:
-        raise ConfigError(f"cannot write the picture {path}: {error.strerror or error}") from error
+    write_figure(make_figure(result, grid, show_tree=show_tree), path)
 
 
-def check_figure_path(path: str | PathLike[str]) -> None:
-    """Refuse a picture file of an unknown format before any work is done for it.
-
-    Raises:
-        ConfigError: the suffix stands for no format that can be written.
-    """
-    formats = FigureCanvasAgg.get_supported_filetypes()
-    if Path(path).suffix.lstrip(".").lower() not in formats:
-        raise ConfigError(
-            f"cannot save a picture as {Path(path).name!r}; its suffix must be one of "
-            f"{', '.join('.' + name for name in sorted(formats))}"
-        )
-
-
-def draw_plan(result: PlanResult, grid: GridMap) -> Figure:
-    """The picture as a matplotlib figure; arguments as for :func:`save_figure`."""
-    scale = _MAP_SIDE / max(grid.shape)
-    map_width, map_height = grid.width * scale, grid.height * scale
-    width = max(map_width, 0.8 * _MAP_SIDE) + 2 * _MARGIN
-    height = map_height + _TITLE + _LEGEND
+def make_figure(result: PlanResult, grid: GridMap, *, show_tree: bool = True) -> Figure:
+    """Return the figure of a plan; arguments as for :func:`save_figure`."""
+    left, top, right, bottom = _visible_box(grid)
+    scale = _MAP_SIZE / max(right - left, bottom - top)
+    map_width, map_height = (right - left) * scale, (bottom - top) * scale
+    width = max(map_width, 0.8 * _MAP_SIZE) + 2 * _TICKS
+    height = map_height + _TITLE + _TICKS + _LEGEND + _MARGIN
+    low = _LEGEND + _TICKS
     figure = Figure(figsize=(width, height))
     axes = figure.add_axes(
-        ((width - map_width) / 2 / width, _LEGEND / height, map_width / width, map_height / height)
+        ((width - map_width) / 2 / width, low / height, map_width / width, map_height / height)
     )
-    handles = draw_heatmap(axes, result, grid)
+    handles = draw_plan(axes, result, grid, show_tree=show_tree)
+    _label_axes(axes, grid)
     figure.text(0.5, 1 - 0.25 / height, _headline(result), ha="center", va="center", fontsize=11)
-    figure.text(0.5, 1 - 0.48 / height, _figures(result), ha="center", va="center", fontsize=9)
+    figure.text(0.5, 1 - 0.48 / height, _summary(result), ha="center", va="center", fontsize=9)
     figure.legend(handles=handles, loc="lower center", ncols=4, frameon=False, fontsize=9)
     return figure
 
 
-def draw_heatmap(axes: Axes, result: PlanResult, grid: GridMap) -> list[Artist]:
-    """Draw a plan on some axes; ``result`` and ``grid`` as for :func:`save_figure`.
+def draw_plan(
+    axes: Axes, result: PlanResult, grid: GridMap, *, show_tree: bool = True
+) -> list[Artist]:
+    """Draw a plan on some axes, in pixels of the map, without ticks.
+
+    Args:
+        axes: where to draw.
+        result: as for :func:`save_figure`.
+        grid: the same.
+        show_tree: the same.
 
     Returns:
         What a legend needs.
     """
-    handles = [*_draw_map(axes, result, grid), *_draw_plan(axes, result, grid)]
-    axes.set(xlim=(0, grid.width), ylim=(grid.height, 0), xticks=[], yticks=[])
+    handles: list[Artist] = [*_draw_map(axes, result, grid)]
+    if show_tree and result.tree is not None and len(result.tree):
+        handles.append(_draw_tree(axes, grid.to_pixel(result.tree)))
+    if result.solved:
+        handles.append(_draw_path(axes, grid.to_pixel(result.path)))
+    handles += mark_endpoints(axes, grid.to_pixel(result.start), grid.to_pixel(result.goal))
+    left, top, right, bottom = _visible_box(grid)
+    axes.set(xlim=(left, right), ylim=(bottom, top), xticks=[], yticks=[])
     return handles
+
+
+def _visible_box(grid: GridMap) -> tuple[int, int, int, int]:
+    """Return the part of the map that holds all free pixels: left, top, right, bottom, pixels."""
+    rows, columns = np.flatnonzero(grid.free.any(1)), np.flatnonzero(grid.free.any(0))
+    padding = max(_LEAST_PADDING, round(_PADDING * max(np.ptp(rows), np.ptp(columns))))
+    return (
+        max(0, int(columns[0]) - padding),
+        max(0, int(rows[0]) - padding),
+        min(grid.width, int(columns[-1]) + 1 + padding),
+        min(grid.height, int(rows[-1]) + 1 + padding),
+    )
 
 
 def _draw_map(axes: Axes, result: PlanResult, grid: GridMap) -> list[Patch]:
@@ -102,17 +136,22 @@ def _draw_map(axes: Axes, result: PlanResult, grid: GridMap) -> list[Patch]:
     handles = []
     if result.heatmap is not None:
         handles.append(Patch(facecolor=_HEAT(1.0), label=f"heat map ({result.sampler})"))
+    unknown = np.zeros(grid.shape, np.bool_) if grid.unknown is None else grid.unknown
+    inflated = np.zeros(grid.shape, np.bool_)
+    if result.heatmap is not None:
         inflated = grid.free & ~result.heatmap.grid.free
-        if inflated.any():
-            _paint(axes, inflated, _INFLATED)
-            handles.append(Patch(facecolor=_INFLATED, label="inflated by the radius"))
-    if not grid.free.all():
-        _paint(axes, ~grid.free, _OBSTACLE)
-        handles.append(Patch(facecolor=_OBSTACLE, label="obstacle"))
+    for mask, color, label in (
+        (inflated, _INFLATED, "inflated by the radius"),
+        (~grid.free & ~unknown, OBSTACLE, "obstacle"),
+        (~grid.free & unknown, UNKNOWN, "unknown"),
+    ):
+        if mask.any():
+            _paint(axes, mask, color)
+            handles.append(Patch(facecolor=color, label=label))
     return handles
 
 
-def _paint(axes: Axes, mask: np.ndarray[tuple[int, int], np.dtype[np.bool_]], color: str) -> None:
+def _paint(axes: Axes, mask: NDArray[np.bool_], color: str) -> None:
     height, width = mask.shape
     cover = LinearSegmentedColormap.from_list("cover", [color, color])
     axes.imshow(
@@ -123,31 +162,51 @@ def _paint(axes: Axes, mask: np.ndarray[tuple[int, int], np.dtype[np.bool_]], co
     )
 
 
-def _draw_plan(axes: Axes, result: PlanResult, grid: GridMap) -> list[Line2D]:
-    handles = []
-    if result.tree is not None and len(result.tree):
-        edges = grid.to_pixel(result.tree)
-        axes.add_collection(LineCollection(list(edges), colors=_TREE, linewidths=0.4, alpha=0.6))
-        handles.append(Line2D([], [], color=_TREE, linewidth=0.8, label="tree"))
-    if result.solved:
-        path = grid.to_pixel(result.path)
-        axes.plot(*path.T, color="white", linewidth=4.5, solid_capstyle="round")
-        handles += axes.plot(*path.T, color=_PATH, linewidth=2.2, label="path")
-    for point, marker, color, label in (
-        (result.start, "o", _START, "start"),
-        (result.goal, "*", _GOAL, "goal"),
-    ):
-        handles += axes.plot(
-            *grid.to_pixel(point),
-            marker=marker,
-            color=color,
-            markersize=10 if marker == "o" else 15,
-            markeredgecolor="white",
-            linestyle="none",
-            label=label,
-            zorder=5,
-        )
-    return handles
+def _draw_tree(axes: Axes, edges: NDArray[np.float64]) -> Line2D:
+    width = float(np.clip(_WIDTH_OF_ONE / np.sqrt(len(edges)), _THINNEST, _WIDEST))
+    axes.add_collection(LineCollection(list(edges), colors=BLUE, linewidths=width, alpha=0.6))
+    return Line2D([], [], color=BLUE, linewidth=0.8, label="tree")
+
+
+def _draw_path(axes: Axes, path: NDArray[np.float64]) -> Line2D:
+    axes.plot(*path.T, color="white", linewidth=4.5, solid_capstyle="round")
+    (line,) = axes.plot(*path.T, color=BLACK, linewidth=2.2, label="path")
+    return line
+
+
+def _label_axes(axes: Axes, grid: GridMap) -> None:
+    """Show world coordinates along the axes, or a scale bar where the map lies askew."""
+    unit = "pixels" if grid.origin is None and grid.resolution == 1 else "world units"
+    if grid.origin is not None:
+        unit = "m"
+        if grid.origin[2] != 0:
+            _draw_scale_bar(axes, grid)
+            return
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    corners = grid.to_world([(left, bottom), (right, top)])
+    for axis, limits, number in ((axes.xaxis, corners[:, 0], 0), (axes.yaxis, corners[:, 1], 1)):
+        low, high = sorted(limits.tolist())
+        values = MaxNLocator(_MOST_TICKS).tick_values(low, high)
+        values = values[(values >= low) & (values <= high)]
+        places = grid.to_pixel(np.stack((values, values), axis=-1))[:, number]
+        axis.set_major_locator(FixedLocator(places.tolist()))
+        axis.set_major_formatter(FixedFormatter([f"{value:g}" for value in values]))
+    axes.tick_params(labelsize=8)
+    axes.set_xlabel(f"x, {unit}", fontsize=8, labelpad=1)
+    axes.set_ylabel(f"y, {unit}", fontsize=8, labelpad=1)
+
+
+def _draw_scale_bar(axes: Axes, grid: GridMap) -> None:
+    """Draw a bar of a round length, at most a quarter of the width, below the map."""
+    left, right = axes.get_xlim()
+    bottom, top = axes.get_ylim()
+    most = (right - left) * grid.resolution / 4
+    length = float(10 ** np.floor(np.log10(most)))
+    length *= max(factor for factor in (1, 2, 5) if factor * length <= most)
+    below = bottom + 0.03 * (bottom - top)
+    ends = (left, left + length / grid.resolution)
+    axes.plot(ends, (below, below), color=BLACK, linewidth=2.5, clip_on=False)
+    axes.text(ends[1] + 0.01 * (right - left), below, f"{length:g} m", fontsize=8, va="center")
 
 
 def _headline(result: PlanResult) -> str:
@@ -155,7 +214,7 @@ def _headline(result: PlanResult) -> str:
     return f"{result.map}: {result.planner}, {result.sampler} sampler, {outcome}"
 
 
-def _figures(result: PlanResult) -> str:
+def _summary(result: PlanResult) -> str:
     first = result.first_solution_s
     return (
         f"planning {result.planning_s:.3g} s"

@@ -10,7 +10,7 @@ import argparse
 from matplotlib.figure import Figure
 
 from cbagan_ompl import GridMap, load_model, plan, tasks_of
-from cbagan_ompl.plotting import draw_heatmap
+from cbagan_ompl.plotting import draw_plan
 
 #: The maps, and the number of the task that is shown on each.
 SHOWN = {"rooms": 0, "maze": 1, "warehouse": 1, "bug_trap": 0, "narrow_passage": 1, "clutter": 0}
@@ -31,7 +31,7 @@ def main() -> None:
         # First, because the first call of a size takes longer.
         raw = predictor.predict(grid, task.start, task.goal, repair=False)
         result = plan(grid, task.start, task.goal, model=predictor, time=0.3, range=20, seed=0)
-        draw_heatmap(axes, result, grid)
+        draw_plan(axes, result, grid)
         state = "connected" if raw.connects(task.start, task.goal) else "repaired"
         axes.set_title(f"{name}: {state}, {1e3 * result.inference_s:.0f} ms", fontsize=9)
     figure.savefig(args.output, dpi=110)

@@ -8,7 +8,7 @@ import pytest
 from helpers.tasks import GOAL, START
 
 from cbagan_ompl import ConfigError, GridMap, plan
-from cbagan_ompl.plotting import draw_plan, save_figure
+from cbagan_ompl.plotting import make_figure, save_figure
 
 
 def legend(result_figure: object) -> set[str]:
@@ -17,9 +17,18 @@ def legend(result_figure: object) -> set[str]:
 
 def test_everything_is_drawn(two_walls: GridMap) -> None:
     result = plan(
-        two_walls, START, GOAL, "RRT", "corridor", 5, range=20, radius=3, seed=0, keep_tree=True
+        two_walls,
+        START,
+        GOAL,
+        "RRT",
+        "corridor",
+        time=5,
+        range=20,
+        radius=3,
+        seed=0,
+        keep_tree=True,
     )
-    figure = draw_plan(result, two_walls)
+    figure = make_figure(result, two_walls)
     assert legend(figure) == {
         "heat map (corridor)", "obstacle", "inflated by the radius", "tree", "path", "start", "goal"
     }  # fmt: skip
@@ -29,8 +38,8 @@ def test_everything_is_drawn(two_walls: GridMap) -> None:
 
 
 def test_no_path_no_line(two_walls: GridMap) -> None:
-    result = plan(two_walls, START, GOAL, "RRT", "uniform", 5, iterations=5, seed=0)
-    figure = draw_plan(result, two_walls)
+    result = plan(two_walls, START, GOAL, "RRT", "uniform", time=5, iterations=5, seed=0)
+    figure = make_figure(result, two_walls)
     assert legend(figure) == {"obstacle", "start", "goal"}
     assert "no exact solution" in figure.texts[0].get_text()
 
@@ -39,7 +48,7 @@ def test_no_path_no_line(two_walls: GridMap) -> None:
 def test_any_aspect_and_frame(tmp_path: Path, shape: tuple[int, int]) -> None:
     grid = GridMap(np.ones(shape, bool), 0.1, (5.0, -3.0, 0.4))
     start, goal = grid.to_world([(5, 5), (shape[1] - 5, shape[0] - 5)])
-    result = plan(grid, start, goal, "RRT", "straight-line", 2, seed=0, keep_tree=True)
+    result = plan(grid, start, goal, "RRT", "straight-line", time=2, seed=0, keep_tree=True)
     save_figure(result, grid, tmp_path / "plan.png")
     image = cv2.imread(str(tmp_path / "plan.png"))
     ratio = image.shape[0] / image.shape[1]
@@ -47,6 +56,45 @@ def test_any_aspect_and_frame(tmp_path: Path, shape: tuple[int, int]) -> None:
 
 
 def test_bad_suffix(tmp_path: Path, two_walls: GridMap) -> None:
-    result = plan(two_walls, START, GOAL, "RRT", "corridor", 5, range=20, seed=0)
+    result = plan(two_walls, START, GOAL, "RRT", "corridor", time=5, range=20, seed=0)
     with pytest.raises(ConfigError, match=r"'plan\.txt'.*\.png"):
         save_figure(result, two_walls, tmp_path / "plan.txt")
+
+
+def ticks(figure: object, axis: str) -> list[str]:
+    (axes,) = figure.axes  # type: ignore[attr-defined]
+    return [label.get_text() for label in getattr(axes, f"get_{axis}ticklabels")()]
+
+
+def test_axes_are_in_world_units(two_walls: GridMap) -> None:
+    result = plan(two_walls, START, GOAL, "RRT", "uniform", time=5, iterations=5, seed=0)
+    figure = make_figure(result, two_walls)
+    assert ticks(figure, "x") == ticks(figure, "y") == ["0", "40", "80", "120", "160", "200", "240"]
+    metres = GridMap(two_walls.free, 0.1, (-10.0, 2.0, 0.0))
+    start, goal = metres.to_world([START, GOAL])
+    figure = make_figure(plan(metres, start, goal, "RRT", "uniform", time=0.1, seed=0), metres)
+    assert ticks(figure, "x")[0] == "-8" or ticks(figure, "x")[0] == "-10"
+    assert figure.axes[0].get_xlabel() == "x, m"
+
+
+def test_maps_askew_have_a_scale_bar(two_walls: GridMap) -> None:
+    askew = GridMap(two_walls.free, 0.1, (5.0, -3.0, 0.4))
+    start, goal = askew.to_world([START, GOAL])
+    figure = make_figure(plan(askew, start, goal, "RRT", "uniform", time=0.1, seed=0), askew)
+    assert ticks(figure, "x") == []
+    assert [text.get_text() for text in figure.axes[0].texts] == ["5 m"]
+
+
+def test_unknown_space_is_no_obstacle_and_the_margin_is_cut_off() -> None:
+    unknown = np.ones((200, 300), bool)
+    unknown[80:120, 100:180] = False
+    free = ~unknown
+    free[95:100, 120:160] = False
+    grid = GridMap(free, unknown=unknown)
+    result = plan(grid, (105, 85), (175, 115), "RRT", "corridor", time=5, range=9, seed=0)
+    figure = make_figure(result, grid)
+    assert {"unknown", "obstacle"} < legend(figure)
+    (left, right), (bottom, top) = figure.axes[0].get_xlim(), figure.axes[0].get_ylim()
+    assert (left, right, bottom, top) == (97, 183, 123, 77)
+    hidden = make_figure(result, grid, show_tree=False)
+    assert "tree" not in legend(hidden)

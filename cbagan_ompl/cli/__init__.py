@@ -27,8 +27,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit status: 0 done, 1 no path found, 2 bad input, 130 interrupted, 141 nobody reads
         the output.
     """
-    parser = _parser()
-    args = parser.parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
+    # Figures are files: whatever backend a notebook or a screen asks for may not be there.
+    os.environ["MPLBACKEND"] = "agg"
+    parser = _make_parser()
+    args = parser.parse_args(_bind_points(sys.argv[1:] if arguments is None else arguments))
     try:
         check_folder(getattr(args, "json", None))
         return int(args.run(args))
@@ -44,18 +46,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 141
 
 
-def _joined(arguments: Sequence[str]) -> list[str]:
-    """Points joined to their options: argparse takes what begins with "-" for an option."""
-    joined: list[str] = []
+def _bind_points(arguments: Sequence[str]) -> list[str]:
+    """Write points as ``--start=X,Y``: argparse takes what begins with "-" for an option."""
+    bound: list[str] = []
     for argument in arguments:
-        if joined and joined[-1] in ("--start", "--goal"):
-            joined[-1] += f"={argument}"
+        if bound and bound[-1] in ("--start", "--goal"):
+            bound[-1] += f"={argument}"
         else:
-            joined.append(argument)
-    return joined
+            bound.append(argument)
+    return bound
 
 
-def _parser() -> argparse.ArgumentParser:
+def _make_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="cbagan-ompl", description="A learned state sampler for OMPL's planners."
     )

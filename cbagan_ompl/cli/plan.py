@@ -81,7 +81,8 @@ def add_plan_parser(commands: Any) -> None:
     add_sampler_options(sampler)
 
     output = parser.add_argument_group("output")
-    output.add_argument("--output", metavar="FILE", help="picture of the plan (.png, .pdf, .svg)")
+    output.add_argument("--output", metavar="FILE", help="figure of the plan (.png, .pdf, .svg)")
+    output.add_argument("--no-tree", action="store_true", help="leave the tree out of the figure")
     output.add_argument("--json", metavar="FILE", help="result as JSON")
 
 
@@ -97,13 +98,14 @@ def _point(text: str) -> tuple[float, float]:
 
 def _plan(args: argparse.Namespace) -> int:
     from ..planning.plan import plan
-    from ..plotting import check_figure_path, save_figure
 
     if args.output is not None:
+        from ..common.figures import check_figure_path
+
         check_figure_path(args.output)
     check_folder(args.output)
     grid = GridMap.load(args.map, **map_options(args))
-    start, goal = _ends(args, grid)
+    start, goal = _endpoints(args, grid)
     result = plan(
         grid,
         start,
@@ -117,19 +119,21 @@ def _plan(args: argparse.Namespace) -> int:
         model=args.model,
         heatmap=None if args.heatmap is None else Heatmap.load(args.heatmap, grid),
         simplify=args.simplify,
-        keep_tree=args.output is not None,
+        keep_tree=args.output is not None and not args.no_tree,
         options=sampler_options(args),
     )
     values = result.to_dict()
     if args.json is not None:
         write_json(args.json, values)
     if args.output is not None:
+        from ..plotting import save_figure
+
         save_figure(result, grid, args.output)
     _print_summary(values, args.output)
     return 0 if result.solved else 1
 
 
-def _ends(
+def _endpoints(
     args: argparse.Namespace, grid: GridMap
 ) -> tuple[tuple[float, float], tuple[float, float]]:
     if args.start is not None and args.goal is not None and args.task is None:
@@ -148,7 +152,7 @@ def _ends(
     return tasks[number].start, tasks[number].goal
 
 
-def _print_summary(values: dict[str, Any], picture: str | None) -> None:
+def _print_summary(values: dict[str, Any], figure: str | None) -> None:
     solved = f"yes, cost {values['cost']:.6g}" if values["solved"] else f"no ({_why(values)})"
     first, counts = values["first_solution_s"], values["sample_counts"]
     rows = {
@@ -161,7 +165,7 @@ def _print_summary(values: dict[str, Any], picture: str | None) -> None:
         "planning": f"{values['planning_s']:.4f} s"
         + ("" if first is None else f", first solution after {first:.4f} s"),
         "seed": values["seed"],
-        **({"picture": picture} if picture else {}),
+        **({"figure": figure} if figure else {}),
     }
     for name, value in rows.items():
         print(f"{name:<14} {value}")

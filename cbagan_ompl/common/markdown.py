@@ -6,6 +6,13 @@ from collections.abc import Iterable, Sequence
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table, without a line break at its end."""
+    """Return a table, without a line break at its end.
+
+    Example:
+        >>> print(table(["map", "cost"], [["maze", "12"]]))
+        | map | cost |
+        | --- | --- |
+        | maze | 12 |
+    """
     lines = [header, ["---"] * len(header), *rows]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)

@@ -22,7 +22,9 @@ T = TypeVar("T")
 
 @contextmanager
 def interrupts_held() -> Iterator[Connection]:
-    """An interrupt in the block comes at its end; the yielded connection is then ready to read.
+    """Hold an interrupt back until the end of the block.
+
+    The yielded connection is ready to read once an interrupt has come.
 
     A wait for the connection may miss an interrupt that another thread takes, until the next one.
 
@@ -44,7 +46,7 @@ def interrupts_held() -> Iterator[Connection]:
 
 
 def fork_server(preload: Sequence[str] = ()) -> ForkServerContext:
-    """What makes processes that are forked from a clean server.
+    """Return what makes processes that are forked from a clean server.
 
     OMPL, OpenCV and torch have threads, which a fork does not survive. Neither the server nor its
     processes hear the interrupt of a terminal, which is for all processes that it started: they
@@ -71,7 +73,7 @@ def run_all(
     unit: str,
     progress: bool = True,
 ) -> list[T]:
-    """Results of ``work(*args)`` for each of the arguments, in their order.
+    """Return the results of ``work(*args)`` for each of the arguments, in their order.
 
     Args:
         work: a function of a module.

@@ -16,7 +16,7 @@ Connectivity = Literal[4, 8]
 
 
 def label_components(mask: NDArray[np.bool_], *, connectivity: Connectivity) -> NDArray[np.int32]:
-    """Number the connected parts of a mask.
+    """Label the connected parts of a mask with numbers.
 
     Args:
         mask: (H, W), true inside.

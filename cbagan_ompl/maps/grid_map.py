@@ -56,6 +56,8 @@ class GridMap:
         resolution: world units per pixel.
         origin: pose of the lower left corner for maps in the ROS frame.
         name: what the map is called in messages and results.
+        unknown: shape (H, W), true where nothing is known of a pixel, whether it counts as free or
+            not; None where no pixel is so. It serves figures alone.
 
     Raises:
         MapError: not a 2-D array of at least 1 x 1 pixel, too large (see
@@ -75,6 +77,7 @@ class GridMap:
         origin: tuple[float, float, float] | None = None,
         *,
         name: str = "map",
+        unknown: NDArray[np.bool_] | None = None,
     ) -> None:
         try:
             cells = np.asarray(free)
@@ -110,6 +113,7 @@ class GridMap:
             None if origin is None else (float(origin[0]), float(origin[1]), float(origin[2]))
         )
         self.name = name
+        self.unknown = unknown
 
     @classmethod
     def load(cls, path: str | PathLike[str], **options: Any) -> GridMap:
@@ -126,7 +130,7 @@ class GridMap:
             ConfigError: an unknown option, or one with a value that makes no sense.
         """
         raw = read_map(path, **options)
-        return cls(raw.free, raw.resolution, raw.origin, name=raw.name)
+        return cls(raw.free, raw.resolution, raw.origin, name=raw.name, unknown=raw.unknown)
 
     @property
     def width(self) -> int:
@@ -245,7 +249,7 @@ class GridMap:
                 f"({self.width} x {self.height} pixels of {self.resolution})"
             )
         name = f"{self.name} (inflated by {radius:g})"
-        return GridMap(free, self.resolution, self.origin, name=name)
+        return GridMap(free, self.resolution, self.origin, name=name, unknown=self.unknown)
 
     @cached_property
     def clearance(self) -> NDArray[np.float32]:

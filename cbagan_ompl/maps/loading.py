@@ -123,4 +123,4 @@ def _read_image_map(data: bytes, place: str, name: str, settings: MapOptions) ->
             f"{place}: no pixel is opaque and as bright as the threshold {settings.threshold:g}; "
             "choose a lower threshold, or unknown_is_free where free space is transparent"
         )
-    return RawMap(free, name)
+    return RawMap(free, name, unknown=None if opaque is None else ~opaque)

@@ -25,12 +25,14 @@ class RawMap:
         resolution: world units per pixel.
         origin: pose (x, y, yaw) of the lower left corner for maps in the ROS frame; None for maps
             in the image frame, see :class:`cbagan_ompl.GridMap`.
+        unknown: (H, W), true where the file says that nothing is known; None where no pixel is so.
     """
 
     free: NDArray[np.bool_]
     name: str
     resolution: float = 1.0
     origin: tuple[float, float, float] | None = None
+    unknown: NDArray[np.bool_] | None = None
 
 
 def check_map_size(width: int, height: int, name: str) -> None:

@@ -149,11 +149,15 @@ def read_ros_map(path: Path, *, unknown_is_free: bool) -> RawMap:
     else:
         level_is_free = occupancy <= free_thresh
     free: NDArray[np.bool_] = level_is_free[gray]
+    # What lies between the thresholds is partly occupied in scale mode, not unknown.
+    between = (occupancy > free_thresh) & (occupancy < occupied_thresh) & (mode != "scale")
+    unknown: NDArray[np.bool_] = (between | (occupancy > 1))[gray]
     if opaque is not None:
         free = free | ~opaque if unknown_is_free else free & opaque
+        unknown = unknown | ~opaque
     if not free.any():
         raise MapError(
             f"{path}: no pixel of the image is free with mode {mode}, negate {int(negate)} and "
             f"free_thresh {free_thresh:g}; if all are unknown, try unknown_is_free"
         )
-    return RawMap(free, path.stem, resolution, origin)
+    return RawMap(free, path.stem, resolution, origin, unknown if unknown.any() else None)

@@ -25,7 +25,7 @@ class InterruptGuard:
         return self._error is not None
 
     def wrap(self, callback: Callable[..., None]) -> Callable[..., None]:
-        """The callback with its exceptions kept, and not called any more after the first one."""
+        """Return the callback with its exceptions kept, and not called any more after the first."""
 
         def guarded(*arguments: Any) -> None:
             if self._error is None:

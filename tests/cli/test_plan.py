@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shlex
 import subprocess
 import sys
@@ -162,3 +163,32 @@ def test_json_without_its_folder_is_refused_before_the_work(
     path = tmp_path / "none" / "x.json"
     assert main([*words, "--json", str(path)]) == 2
     assert f"cannot write {path}: its folder does not exist" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("backend", ["module://matplotlib_inline.backend_inline", "no such"])
+def test_any_backend_in_the_environment(tmp_path: Path, backend: str) -> None:
+    """A notebook exports one that its subprocesses cannot load."""
+    figure = tmp_path / "plan.png"
+    command = [sys.executable, "-m", "cbagan_ompl.cli", *QUICK, "--output", str(figure)]
+    done = subprocess.run(
+        command, env={**os.environ, "MPLBACKEND": backend}, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    assert figure.stat().st_size > 0
+
+
+def test_no_figure_no_matplotlib() -> None:
+    code = (
+        "import sys; from cbagan_ompl.cli import main;"
+        f"status = main({QUICK!r}); sys.exit(status or 'matplotlib' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True).returncode == 0
+
+
+def test_no_tree(tmp_path: Path) -> None:
+    sizes = []
+    for words in ([], ["--no-tree"]):
+        path = tmp_path / "plan.svg"
+        assert main([*QUICK, "--seed", "0", "--output", str(path), *words]) == 0
+        sizes.append(path.stat().st_size)
+    assert sizes[1] < sizes[0]

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
-from itertools import pairwise
 from math import floor, pi
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from cbagan_ompl.errors import MapError, TaskError
-from cbagan_ompl.maps.collision import segment_is_free
 from cbagan_ompl.maps.grid_map import GridMap
 from cbagan_ompl.maps.raw_map import MAX_SIDE
 
@@ -100,86 +99,6 @@ def test_is_free_outside_and_for_nan():
 
 
 # --- segments ---------------------------------------------------------------------------------
-
-
-def pixels_on_the_way(u0, v0, u1, v1):
-    """All pixels that a segment passes through, in exact arithmetic; all four at a corner."""
-    u0, v0, u1, v1 = (Fraction(x) for x in (u0, v0, u1, v1))
-
-    def at(t):
-        return u0 + t * (u1 - u0), v0 + t * (v1 - v0)
-
-    def pixel(t):
-        u, v = at(t)
-        return floor(u), floor(v)
-
-    times = {Fraction(0), Fraction(1)}
-    for a, b in ((u0, u1), (v0, v1)):
-        if a != b:
-            for border in range(floor(min(a, b)), floor(max(a, b)) + 2):
-                t = (border - a) / (b - a)
-                if 0 <= t <= 1:
-                    times.add(t)
-    times = sorted(times)
-    found = {pixel(t) for t in times}
-    found |= {pixel((s + t) / 2) for s, t in pairwise(times)}
-    for i, t in enumerate(times):
-        before = pixel((times[i - 1] + t) / 2) if i else pixel(t)
-        after = pixel((times[i + 1] + t) / 2) if i + 1 < len(times) else pixel(t)
-        if before[0] != after[0] and before[1] != after[1]:
-            found |= {(before[0], after[1]), (after[0], before[1])}
-    return found
-
-
-def segments_to_try(rng, width, height):
-    """Random ones, and many through corners, along borders and along the axes and diagonals."""
-    top = np.array([width, height, width, height])
-    yield from rng.uniform(0, 1, (150, 4)) * top
-    quarters = np.floor(rng.uniform(0, 1, (350, 4)) * top * 4) / 4
-    yield from quarters
-    for u, v, other, _ in quarters[:60]:
-        yield u, v, other, v
-        if other < height:
-            yield u, v, u, other
-    for u, v in quarters[:80, :2]:
-        for du, dv in ((1, 1), (1, -1), (2, 1), (-1, 2)):
-            for length in (1.5, 3.0):
-                end = u + du * length, v + dv * length
-                if 0 <= end[0] < width and 0 <= end[1] < height:
-                    yield u, v, *end
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_segments_agree_with_exact_arithmetic(seed):
-    rng = np.random.default_rng(seed)
-    width, height = 13, 9
-    free = random_free(rng, height, width, blocked=0.12)
-    cells = free.tobytes()
-    answers = []
-    for segment in segments_to_try(rng, width, height):
-        u0, v0, u1, v1 = (float(x) for x in segment)
-        way = pixels_on_the_way(u0, v0, u1, v1)
-        expected = all(0 <= c < width and 0 <= r < height and free[r, c] for c, r in way)
-        assert segment_is_free(cells, width, height, u0, v0, u1, v1) == expected, segment
-        assert segment_is_free(cells, width, height, u1, v1, u0, v0) == expected, segment
-        answers.append(expected)
-    assert 0.2 < np.mean(answers) < 0.8  # both answers occur often
-
-
-def test_long_segments_miss_no_corner():
-    # The way from one corner of a large map to near the other, through hundreds of corners, with
-    # one blocked pixel beside a late corner.
-    size = 4000
-    for du, dv in ((1, 1), (3, 2), (7, 5), (1, 3)):
-        steps = (size - 2) // max(du, dv)
-        free = np.ones((size, size), dtype=bool)
-        u0, v0 = 1.0, 1.0
-        u1, v1 = 1.0 + du * (steps - 1), 1.0 + dv * (steps - 1)
-        column, row = 1 + du * (steps - 2), 1 + dv * (steps - 2)
-        free[row - 1, column] = False  # touched at its lower left corner only
-        cells = free.tobytes()
-        assert not segment_is_free(cells, size, size, u0, v0, u1, v1)
-        assert not segment_is_free(cells, size, size, u1, v1, u0, v0)
 
 
 def test_no_way_between_obstacles_that_touch_diagonally():
@@ -350,3 +269,18 @@ def test_clearance_is_the_distance_to_the_nearest_obstacle() -> None:
     exact = np.sqrt(((pixels[:, None] - blocked) ** 2).sum(2)).min(1)
     np.testing.assert_allclose(clearance[free], exact, rtol=0.02)
     assert (clearance[~free] == 0).all()
+
+
+@given(
+    st.integers(1, 40),
+    st.floats(0.01, 10),
+    st.one_of(st.none(), st.tuples(st.floats(-1e3, 1e3), st.floats(-1e3, 1e3), st.floats(-pi, pi))),
+    st.tuples(st.floats(-50, 50), st.floats(-50, 50)),
+)
+def test_world_and_pixel_are_inverse_in_every_frame(height, resolution, origin, pixel):
+    grid = GridMap(np.ones((height, 3)), resolution, origin)
+    back = grid.to_pixel(grid.to_world(pixel))
+    np.testing.assert_allclose(back, pixel, atol=1e-9 * (1 + 1e3 / resolution))
+    # One pixel to the right is as long as the resolution says.
+    step = grid.to_world(pixel) - grid.to_world((pixel[0] + 1, pixel[1]))
+    np.testing.assert_allclose(np.hypot(*step), resolution, rtol=1e-6, atol=1e-9)

@@ -103,14 +103,25 @@ def test_world_frame(two_walls: GridMap) -> None:
     """The same map in metres, y up and turned: same result, up to the frame."""
     grid = GridMap(two_walls.free, 0.05, (-2.0, 7.0, 0.5))
     start, goal = grid.to_world([START, GOAL])
-    result = plan(grid, start, goal, "RRTstar", "corridor", time=1.0, range=1.0, seed=3)
+    result = plan(
+        grid, start, goal, "RRTstar", "corridor", time=60, iterations=3000, range=1.0, seed=3
+    )
     check(result, grid)
     assert 590 < result.cost / 0.05 < 640
 
 
 def test_radius_keeps_clear_of_obstacles(two_walls: GridMap) -> None:
     result = plan(
-        two_walls, START, GOAL, "RRTstar", "corridor", time=0.7, radius=6, range=20, seed=0
+        two_walls,
+        START,
+        GOAL,
+        "RRTstar",
+        "corridor",
+        time=60,
+        iterations=2000,
+        radius=6,
+        range=20,
+        seed=0,
     )
     check(result, two_walls.inflated(6))
     blocked = np.argwhere(~two_walls.free)[:, ::-1]

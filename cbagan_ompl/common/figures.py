@@ -1,0 +1,83 @@
+"""What all figures of the project share: colours, the marks of start and goal, saving."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from ..errors import ConfigError
+from .files import reason
+
+# Okabe and Ito's palette, which colour-blind readers can tell apart
+# (https://jfly.uni-koeln.de/color/).
+BLACK, ORANGE, SKY_BLUE, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
+BLUE, VERMILLION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
+
+#: Obstacles, and space of which nothing is known.
+OBSTACLE, UNKNOWN = "#4d4d4d", "#c3cfdb"
+
+#: Marker, colour and size of the two ends of a task, the same in every figure.
+START_MARK, GOAL_MARK = ("o", GREEN, 10.0), ("*", VERMILLION, 15.0)
+
+
+def mark_endpoints(axes: Axes, start: Any, goal: Any, scale: float = 1.0) -> list[Line2D]:
+    """Draw start and goal.
+
+    Args:
+        axes: where to draw.
+        start: (x, y) in the coordinates of the axes.
+        goal: the same.
+        scale: factor on the size of the marks.
+
+    Returns:
+        What a legend needs.
+    """
+    handles = []
+    for point, (marker, color, size), label in (
+        (start, START_MARK, "start"),
+        (goal, GOAL_MARK, "goal"),
+    ):
+        handles += axes.plot(
+            *point,
+            marker=marker,
+            color=color,
+            markersize=scale * size,
+            markeredgecolor="white",
+            linestyle="none",
+            label=label,
+            zorder=5,
+            clip_on=False,
+        )
+    return handles
+
+
+def check_figure_path(path: str | PathLike[str]) -> None:
+    """Raise if a figure cannot be saved for its suffix, before any work is done for it.
+
+    Raises:
+        ConfigError: the suffix stands for no format that can be written.
+    """
+    formats = FigureCanvasAgg.get_supported_filetypes()
+    if Path(path).suffix.lstrip(".").lower() not in formats:
+        raise ConfigError(
+            f"cannot save a figure as {Path(path).name!r}; its suffix must be one of "
+            f"{', '.join('.' + name for name in sorted(formats))}"
+        )
+
+
+def write_figure(figure: Figure, path: str | PathLike[str], dots_per_inch: int = 150) -> None:
+    """Save a figure; its suffix chooses the format.
+
+    Raises:
+        ConfigError: the file cannot be written.
+    """
+    try:
+        figure.savefig(path, dpi=dots_per_inch)
+    except OSError as error:
+        raise ConfigError(f"cannot write the figure {path}: {reason(error)}") from error
