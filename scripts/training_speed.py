@@ -13,8 +13,9 @@ import time
 import numpy as np
 import torch
 
-from cbagan_ompl.training.config import TrainingConfig
-from cbagan_ompl.training.gan import make_generator, pick_device
+from cbagan_ompl.networks.config import NetworkConfig
+from cbagan_ompl.networks.factory import make_generator
+from cbagan_ompl.training.distributed import pick_device
 
 FORMATS = {"contiguous": torch.contiguous_format, "channels-last": torch.channels_last}
 
@@ -48,7 +49,7 @@ def main() -> None:
     shape = (args.batch_size, 3, args.size, args.size)
     rows = {}
     for name, memory_format in FORMATS.items():
-        generator = make_generator(TrainingConfig()).to(device, memory_format=memory_format)
+        generator = make_generator(NetworkConfig()).to(device, memory_format=memory_format)
         image = torch.rand(shape, device=device).contiguous(memory_format=memory_format)
         for precision in ("float32", "bfloat16"):
             inputs = (image, image, image[:, :1])

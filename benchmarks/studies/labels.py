@@ -3,7 +3,7 @@
     python benchmarks/studies/labels.py --maps 16 --json benchmarks/results/labels.json
 
 A network can at best predict the labels that it is trained on. Here planners sample the labels
-themselves: the exact ones of several widths (EPSILON of cbagan_ompl.datasets.synthetic), and the
+themselves: the exact ones of several widths (EPSILON of cbagan_ompl.datasets.geodesic_labels), and the
 paper's, the union of 50 runs of RRT. Ratios are to OMPL's own sampler, geometric means over the
 tasks.
 """
@@ -24,9 +24,10 @@ from tqdm import trange
 from cbagan_ompl import GridMap, Heatmap, plan
 from cbagan_ompl.common.files import write_json
 from cbagan_ompl.datasets.generation import ITERATIONS, RANGE, RUNS
-from cbagan_ompl.datasets.geodesic import distances
+from cbagan_ompl.datasets.geodesic import distance_field
+from cbagan_ompl.datasets.geodesic_labels import geodesic_label
 from cbagan_ompl.datasets.rrt_labels import rrt_region
-from cbagan_ompl.datasets.synthetic import SyntheticSettings, detour_heat, generate_map_tasks
+from cbagan_ompl.datasets.synthetic import SyntheticSettings, generate_map_tasks
 from cbagan_ompl.planning.compat import ompl_version
 
 EPSILONS = (0.01, 0.02, 0.05, 0.1)
@@ -74,12 +75,12 @@ def labels_of(
     """
     (u, v), (x, y) = (point.astype(int).tolist() for point in endpoints)
     began = perf_counter()
-    from_start, from_goal = distances(grid.free, (u, v)), distances(grid.free, (x, y))
+    from_start, from_goal = distance_field(grid.free, (u, v)), distance_field(grid.free, (x, y))
     exact = perf_counter() - began
     labels: dict[str, NDArray[Any]] = {}
     for epsilon in EPSILONS:
         name = f"exact, {epsilon:.0%}"
-        labels[name] = detour_heat(from_start, from_goal, (x, y), epsilon)
+        labels[name] = geodesic_label(from_start, from_goal, (x, y), epsilon)
         seconds[name].append(exact)
     began = perf_counter()
     task = grid.check_task(*endpoints)

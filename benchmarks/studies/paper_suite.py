@@ -17,7 +17,7 @@ import numpy as np
 
 from cbagan_ompl.datasets.dataset import Dataset, load_dataset
 from cbagan_ompl.datasets.writing import write_csv
-from cbagan_ompl.evaluation.baselines import stored_predictions
+from cbagan_ompl.evaluation.stored_predictions import load_predictions
 
 STORED = "sagan_test_predictions"
 COLUMNS = ("map", "start_x", "start_y", "goal_x", "goal_y", "family")
@@ -61,7 +61,7 @@ def original(name: str) -> str:
 def write_heatmaps(dataset: Path, folder: Path, chosen: np.ndarray, names: list[str]) -> None:
     """Write the stored region of each task as an array that ``--heatmap-dir`` reads."""
     folder.mkdir(exist_ok=True)
-    regions = stored_predictions(dataset / STORED, dataset, "test")
+    regions = load_predictions(dataset / STORED, dataset, "test")
     for row, (i, name) in enumerate(zip(chosen, names, strict=True)):
         number = row - names.index(name)
         # Outside the region a little is left, so that every free pixel can be sampled.

@@ -20,7 +20,7 @@ from tqdm import trange
 from cbagan_ompl import GridMap, PlanResult, load_model, plan
 from cbagan_ompl.benchmarking.plot_styles import STYLES
 from cbagan_ompl.common.files import write_json
-from cbagan_ompl.datasets.geodesic import distances
+from cbagan_ompl.datasets.geodesic import distance_field
 from cbagan_ompl.datasets.synthetic import SyntheticSettings, generate_map_tasks
 from cbagan_ompl.planning.compat import ompl_version
 
@@ -44,7 +44,7 @@ def main() -> None:
         synthetic = generate_map_tasks(SyntheticSettings(), PART, number)
         grid, start, goal = GridMap(synthetic.maps[0]), synthetic.start[0], synthetic.goal[0]
         (u, v), (x, y) = start.astype(int).tolist(), goal.astype(int).tolist()
-        optimum = float(distances(grid.free, (u, v))[y, x])
+        optimum = float(distance_field(grid.free, (u, v))[y, x])
         heatmap = predictor.predict(grid, start, goal)
         for planner in MEASURES:
             options = {"planner": planner, "range": RANGE, "time": TIME, "seed": number}

@@ -31,10 +31,10 @@ from tqdm import tqdm
 from cbagan_ompl import GridMap, Heatmap, PlanResult, Predictor, load_model, plan
 from cbagan_ompl.benchmarking.tasks import BenchmarkTask, select_tasks
 from cbagan_ompl.common.files import write_json
+from cbagan_ompl.networks.config import NetworkConfig
 from cbagan_ompl.networks.export_model import RegionModel
+from cbagan_ompl.networks.factory import make_generator
 from cbagan_ompl.planning.compat import ompl_version
-from cbagan_ompl.training.config import TrainingConfig
-from cbagan_ompl.training.gan import make_generator
 
 RANGE, TIME = 20.0, 2.0
 Endpoints = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -102,7 +102,7 @@ def timed(times: list[float], work: Callable[..., Any], *arguments: Any, **optio
 
 def sagan_ms(size: int, calls: int = 5) -> float:
     """Return the time of one call of a SAGAN of the paper's size; its weights do not matter."""
-    config = TrainingConfig().with_network("sagan")
+    config = NetworkConfig().variant("sagan")
     module = torch.jit.freeze(torch.jit.script(RegionModel(make_generator(config)).eval()))
     predictor = Predictor(module, {"working_size": size, "name": "sagan"})
     free, points = np.ones((1, size, size), bool), np.array([[10.0, 10.0]])

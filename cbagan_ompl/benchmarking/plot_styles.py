@@ -1,8 +1,7 @@
 """How the plots of a benchmark look: colours, marks, axes, the arrangement of panels.
 
 For colour-blind readers and for print in black and white every sampler has a colour of the palette
-of `Okabe and Ito <https://jfly.uni-koeln.de/color/>`_, a dash pattern, a marker and a hatch, the
-same in every plot.
+of :mod:`cbagan_ompl.common.figures`, a dash pattern, a marker and a hatch, the same in every plot.
 """
 
 from __future__ import annotations
@@ -18,6 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
+from ..common.figures import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY_BLUE, VERMILLION
 from .settings import BASELINE
 
 _PANEL_WIDTH, _LEGEND_WIDTH, _LEGEND_HEIGHT = 3.2, 1.7, 0.45
@@ -57,13 +57,13 @@ class Style:
 
 #: The styles in the order in which they are given out; the first one is the baseline's.
 STYLES = (
-    Style("#000000", (4, 2), "s", ""),
-    Style("#0072B2", (), "o", "////"),
-    Style("#009E73", (5, 1, 1, 1), "^", "...."),
-    Style("#E69F00", (1, 1), "D", "xxxx"),
-    Style("#CC79A7", (3, 1, 1, 1, 1, 1), "v", "||||"),
-    Style("#D55E00", (7, 2), "P", "----"),
-    Style("#56B4E9", (2, 2), "X", "++++"),
+    Style(BLACK, (4, 2), "s", ""),
+    Style(BLUE, (), "o", "////"),
+    Style(GREEN, (5, 1, 1, 1), "^", "...."),
+    Style(ORANGE, (1, 1), "D", "xxxx"),
+    Style(PURPLE, (3, 1, 1, 1, 1, 1), "v", "||||"),
+    Style(VERMILLION, (7, 2), "P", "----"),
+    Style(SKY_BLUE, (2, 2), "X", "++++"),
 )
 
 

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from ..common.figures import write_figure
 from .logs import GEOMETRIC, ExperimentLog, number
 from .measures import BEST_KNOWN, INFERENCE, NODES, logged_costs
 from .plot_styles import Panels, Style, legend_handles, styles_of
@@ -63,6 +64,9 @@ def save_plots(logs: Sequence[ExperimentLog], results: Results, within: int, fol
         results: the statistics of the logs.
         within: threshold of a good path, percent above the best known cost.
         folder: where to save the plots.
+
+    Raises:
+        ConfigError: a plot cannot be written.
     """
     runs = _collect_runs(logs)
     improving = {name: some for name, some in runs.items() if _any_improves(some)}
@@ -87,7 +91,7 @@ def save_plots(logs: Sequence[ExperimentLog], results: Results, within: int, fol
             if figure is None:
                 path.unlink(missing_ok=True)  # of an earlier run of the same benchmark
             else:
-                figure.savefig(path, dpi=_DOTS_PER_INCH)
+                write_figure(figure, path, _DOTS_PER_INCH)
 
 
 def _collect_runs(logs: Sequence[ExperimentLog]) -> _Runs:

@@ -10,31 +10,32 @@ from typing import Any
 from ..common.files import write_json
 from ..common.validation import check_at_least
 from ..datasets.generation import LABELS, RANGE, RUNS, GenerationSettings, generate
-from ..datasets.importing import KEEP, described, read_set, write_dataset
+from ..datasets.importing import KEEP, describe, import_dataset, write_dataset
 from ..datasets.splits import SPLITS
 from ..datasets.synthetic import HARD_DETOUR
 from ..errors import ConfigError
 from ..map_generators import MAP_GENERATORS
 
 _HELP = """\
-Training sets: check and split one that is there, make a new one, measure how noisy labels are.
+Import and split a training set, generate a new one, or measure the noise of labels.
 
-A set is a folder with maps/, tasks/, train.csv and test.csv, as the paper's was published.
+A set is a folder with maps/, tasks/, train.csv and test.csv, in the layout of the published set of
+the CBAGAN-RRT paper.
 """
 
 _IMPORT_HELP = """\
-Read a training set, check all of its files, and say what is in it.
+Read a training set, check all of its files, and print what it holds.
 
-PATH is a folder or an archive (.tar.gz, .zip). With --output a clean copy is written, whose lists
-can be made anew: the paper's set is split by task, so that every test map is in training too;
+PATH is a folder or an archive (.tar.gz, .zip). With --output a copy is written, which can be split
+again: the paper's set is split by task, so that every test map is in training too;
 
   cbagan-ompl dataset import mpr.tar.gz --output mpr-by-map --split map --copies 10
 
-puts each original map with its ten copies on one side.
+keeps each original map and its copies together, either in training or in the test.
 """
 
 _GENERATE_HELP = """\
-Make a training set: random maps, tasks on them, and labels, by many runs of RRT or exact ones.
+Generate a training set: random maps, tasks on them, and labels by runs of RRT or exact ones.
 
   cbagan-ompl dataset generate --output mine --maps 100 --tasks 100 --copies 10
   cbagan-ompl train mine --output runs/mine
@@ -43,16 +44,16 @@ The same seed gives the same files, whatever --jobs (with one version of OMPL).
 """
 
 _NOISE_HELP = """\
-Label the test tasks of a set anew, several times, and compare the labels.
+Label the test tasks of a set several times by RRT, and compare the labels.
 
-RRT is random, and so are its labels: how well they agree says how well a network can do at most.
+RRT is random, and so are its labels: their agreement estimates the best score of a network.
 """
 
 
 def add_dataset_parser(commands: Any) -> None:
     """Add the command ``dataset``; the ``run`` defaults take the parsed arguments."""
     parser = commands.add_parser(
-        "dataset", help="make, import and examine training sets", description=_HELP
+        "dataset", help="generate, import and examine training sets", description=_HELP
     )
     actions = parser.add_subparsers(required=True, metavar="ACTION")
     _add_import(actions)
@@ -72,48 +73,51 @@ def _action(actions: Any, name: str, help: str, description: str) -> argparse.Ar
 
 
 def _add_import(actions: Any) -> None:
-    parser = _action(actions, "import", "check a set, and split it anew", _IMPORT_HELP)
+    parser = _action(actions, "import", "check a set, and split it again", _IMPORT_HELP)
     parser.set_defaults(run=_import)
     parser.add_argument("path", metavar="PATH", help="folder or archive")
-    parser.add_argument("--output", metavar="DIR", help="write a copy there")
+    parser.add_argument("--output", metavar="DIR", help="folder for a copy of the set")
     parser.add_argument(
         "--split",
         choices=(KEEP, *SPLITS),
         default=KEEP,
-        help="lists of the copy: as they are, by single tasks, or by original maps (default: keep)",
+        help="split of the copy: as it is, by single tasks, or by original maps (default: keep)",
     )
     _add_split_options(parser)
 
 
 def _add_generate(actions: Any) -> None:
     defaults = GenerationSettings()
-    parser = _action(actions, "generate", "make a set", _GENERATE_HELP)
+    parser = _action(actions, "generate", "generate a set", _GENERATE_HELP)
     parser.set_defaults(run=_generate)
     parser.add_argument("--output", required=True, metavar="DIR", help="folder of the set")
     _add_number(parser, "--maps", defaults.maps, "number of maps")
-    _add_number(parser, "--tasks", defaults.tasks, "on each map")
-    side = "side of the maps in pixels; training takes multiples of 16"
-    _add_number(parser, "--size", defaults.size, side)
+    _add_number(parser, "--tasks", defaults.tasks, "tasks on each map")
+    size = "width and height of the maps in pixels; training takes multiples of 16"
+    _add_number(parser, "--size", defaults.size, size)
     parser.add_argument(
-        "--families",
+        "--generators",
         type=lambda text: tuple(text.split(",")),
-        default=defaults.families,
+        default=defaults.generators,
         metavar="A,B",
-        help=f"kinds of maps, taken in turn (default: all: {','.join(MAP_GENERATORS)})",
+        help=f"map generators, taken in turn (default: all: {','.join(MAP_GENERATORS)})",
     )
     parser.add_argument(
-        "--varied", action="store_true", help="scale, turn and wear the maps at random"
+        "--varied", action="store_true", help="scale, rotate and degrade the maps at random"
     )
-    hard = f"share of tasks whose way is {HARD_DETOUR} times as long as the straight line, or more"
-    _add_number(parser, "--hard-share", defaults.hard_share, hard)
+    hard = (
+        f"fraction of tasks whose shortest path is at least {HARD_DETOUR} times as long as the "
+        "straight line"
+    )
+    _add_number(parser, "--hard-fraction", defaults.hard_fraction, hard)
     parser.add_argument(
         "--label",
         choices=LABELS,
         default=defaults.label,
-        help="rrt: where many runs of RRT pass; geodesic: where paths pass that are not much "
-        f"longer than the shortest (default: {defaults.label})",
+        help="rrt: pixels on the paths of many runs of RRT; geodesic: pixels on paths that are not "
+        f"much longer than the shortest (default: {defaults.label})",
     )
-    distance = "from start to goal, as a share of the side"
+    distance = "least distance from start to goal, as a fraction of the size"
     _add_number(parser, "--min-distance", defaults.min_distance, distance)
     parser.add_argument(
         "--split",
@@ -124,38 +128,38 @@ def _add_generate(actions: Any) -> None:
     _add_split_options(parser)
     _add_label_options(parser)
     parser.add_argument(
-        "--resume", action="store_true", help="go on with a set that was interrupted"
+        "--resume", action="store_true", help="continue a set whose generation was interrupted"
     )
 
 
 def _add_noise(actions: Any) -> None:
-    parser = _action(actions, "noise", "measure how noisy labels are", _NOISE_HELP)
+    parser = _action(actions, "noise", "measure the noise of labels", _NOISE_HELP)
     parser.set_defaults(run=_noise)
     parser.add_argument("dataset", metavar="DATASET", help="folder or archive of a set")
     parser.add_argument(
         "--tasks", type=int, metavar="N", help="only N of the test tasks, chosen by the seed"
     )
-    _add_number(parser, "--seed", 0, "")
+    _add_number(parser, "--seed", 0, "seed of all random numbers")
     _add_label_options(parser)
 
 
 def _add_split_options(parser: argparse.ArgumentParser) -> None:
     copies = "maps from each original, by shift, shear and rotation; 10 in the paper"
     _add_number(parser, "--copies", 1, copies)
-    fraction = "share of the tasks, or of the original maps, for testing"
+    fraction = "fraction of the tasks, or of the original maps, for testing"
     _add_number(parser, "--test-fraction", 0.2, fraction)
-    _add_number(parser, "--seed", 0, "")
+    _add_number(parser, "--seed", 0, "seed of all random numbers")
 
 
 def _add_label_options(parser: argparse.ArgumentParser) -> None:
-    _add_number(parser, "--runs", RUNS, "of RRT for each label")
+    _add_number(parser, "--runs", RUNS, "runs of RRT for each label")
     parser.add_argument(
         "--range",
         type=float,
         metavar="R",
-        help=f"longest edge of RRT in pixels (default: the side / {1 / RANGE:g})",
+        help=f"longest edge of RRT in pixels (default: the size / {1 / RANGE:g})",
     )
-    _add_number(parser, "--jobs", 1, "processes at a time")
+    _add_number(parser, "--jobs", 1, "number of processes")
 
 
 def _add_number(
@@ -167,15 +171,15 @@ def _add_number(
         type=type(default),
         default=default,
         metavar="N" if isinstance(default, int) else "F",
-        help=f"{what} (default: {default})".lstrip(),
+        help=f"{what} (default: {default})",
     )
 
 
 def _import(args: argparse.Namespace) -> int:
     if args.output is None and args.split != KEEP:
         raise ConfigError("a new split is written with a copy of the set: give --output as well")
-    dataset = read_set(Path(args.path))
-    values = described(dataset)
+    dataset = import_dataset(Path(args.path))
+    values = describe(dataset)
     if args.output is not None:
         write_dataset(
             Path(args.output), dataset, args.split, args.copies, args.test_fraction, args.seed
@@ -185,8 +189,8 @@ def _import(args: argparse.Namespace) -> int:
         f"testing, on {values['maps']} maps of {values['side']} x {values['side']} pixels\n"
         f"  maps with tasks in both lists:       {values['shared_maps']}\n"
         f"  test tasks that are in training too: {values['repeated_tasks']}\n"
-        f"  labels that join start and goal:     {values['joined']:.2%}\n"
-        f"  region, share of free space:         {values['region_share']:.1%}\n"
+        f"  labels that connect start and goal:  {values['joined']:.2%}\n"
+        f"  fraction of free space in regions:   {values['region_share']:.1%}\n"
         f"  tasks with a blocked start or goal:  {values['blocked_ends']}"
     )
     if args.output is not None:
@@ -201,11 +205,11 @@ def _generate(args: argparse.Namespace) -> int:
         maps=args.maps,
         tasks=args.tasks,
         size=args.size,
-        families=args.families,
+        generators=args.generators,
         varied=args.varied,
         copies=args.copies,
         label=args.label,
-        hard_share=args.hard_share,
+        hard_fraction=args.hard_fraction,
         runs=args.runs,
         range=args.range,
         min_distance=args.min_distance,
@@ -217,22 +221,22 @@ def _generate(args: argparse.Namespace) -> int:
     try:
         generate(Path(args.output), settings, args.jobs, args.resume)
     except KeyboardInterrupt:
-        print("interrupted; go on with the same command and --resume", file=sys.stderr)
+        print("interrupted; continue with the same command and --resume", file=sys.stderr)
         return 130
     print(f"{settings.maps * settings.tasks} tasks written to {args.output}")
     if args.json is not None:
-        write_json(args.json, described(read_set(Path(args.output))))
+        write_json(args.json, describe(import_dataset(Path(args.output))))
     return 0
 
 
 def _noise(args: argparse.Namespace) -> int:
-    from ..evaluation.label_noise import chosen_tasks, label_noise
+    from ..evaluation.label_noise import choose_tasks, label_noise
 
     check_at_least("jobs", args.jobs, 1)
-    tasks = read_set(Path(args.dataset)).test
+    tasks = import_dataset(Path(args.dataset)).test
     if args.tasks is not None:
-        tasks = chosen_tasks(tasks, args.tasks, args.seed)
-    longest_edge = tasks.side * RANGE if args.range is None else args.range
+        tasks = choose_tasks(tasks, args.tasks, args.seed)
+    longest_edge = tasks.size * RANGE if args.range is None else args.range
     values = label_noise(tasks, args.runs, longest_edge, args.seed, args.jobs)
     print(f"agreement of labels on {len(tasks)} tasks, {args.runs} runs of RRT each")
     for name, scores in values.items():

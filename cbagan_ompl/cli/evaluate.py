@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..common.files import write_json
+from ..common.files import make_folder, write_atomically, write_json
 from ..common.validation import check_at_least
 from ..errors import ConfigError
 
@@ -16,18 +16,19 @@ if TYPE_CHECKING:
     from ..evaluation.evaluator import Evaluation
 
 _HELP = """\
-Score models on the tasks of a training set, next to predictors that know nothing.
+Score models on the tasks of a training set, next to trivial baselines.
 
   cbagan-ompl evaluate --dataset DATASET
   cbagan-ompl evaluate --dataset DATASET --model mine.pt --model other.pt --output scores
 
-All scores are those of the region alone: pixels that lie outside both regions are not counted, so
-that an empty prediction scores 0. In brackets 95 % bootstrap intervals (of maps, and of tasks on
-them). "joined" is the share of tasks whose start and goal the predicted region joins in free space.
-The Frechet distance is an FID only with --inception.
+All scores are those of the region alone: pixels outside both regions are not counted, so that an
+empty prediction scores 0. In brackets are 95 % bootstrap intervals, over maps and over the tasks on
+them. "connected" is the fraction of tasks whose start and goal the predicted region connects
+through free space, with 8 or 4 neighbours of a pixel. The Frechet distance is an FID only with
+--inception.
 
-The output folder gets evaluation.json, evaluation.md and a picture of each model's best, middling
-and worst cases.
+The output folder gets evaluation.json, evaluation.md and, for each prediction but the baselines, a
+figure of its best, median and worst cases.
 """
 
 
@@ -52,7 +53,7 @@ def add_evaluate_parser(commands: Any) -> None:
         action="append",
         default=[],
         metavar="NAME=DIR",
-        help="stored pictures of regions, green on white, with a results.csv (columns true_roi, "
+        help="stored images of regions, green on white, with a results.csv (columns true_roi, "
         "pred_roi) or named as the labels; may be repeated",
     )
     parser.add_argument(
@@ -65,31 +66,37 @@ def add_evaluate_parser(commands: Any) -> None:
         "which makes the Frechet distance an FID",
     )
     parser.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="of the intervals (default: 0)"
+        "--seed", type=int, default=0, metavar="N", help="seed of the intervals (default: 0)"
     )
-    parser.add_argument("--output", metavar="DIR", help="folder for the results and pictures")
+    parser.add_argument("--output", metavar="DIR", help="folder for the results and figures")
     parser.add_argument("--json", metavar="FILE", help="write the scores as JSON")
 
 
 def _evaluate(args: argparse.Namespace) -> int:
     from ..datasets.dataset import load_dataset
-    from ..evaluation.baselines import stored_predictions, trivial_baselines
+    from ..evaluation.baselines import trivial_baselines
     from ..evaluation.evaluator import Evaluator
-    from ..evaluation.frechet import INCEPTION_NAME, OWN_NAME, inception_features, region_features
+    from ..evaluation.frechet import (
+        INCEPTION_NAME,
+        REGION_GRID_NAME,
+        inception_features,
+        region_features,
+    )
     from ..evaluation.report import markdown
+    from ..evaluation.stored_predictions import load_predictions
     from ..inference.predictor import load_model
 
     check_at_least("seed", args.seed, 0)
-    stored = [_named(text) for text in args.predictions]
+    stored = [_parse_predictions(text) for text in args.predictions]
     models = [load_model(path) for path in args.model or [None]]
     names = [str(model.record["name"]) for model in models] + [name for name, _ in stored]
     dataset = load_dataset(args.dataset)
     tasks = dataset.test if args.split == "test" else dataset.train
-    trivial = trivial_baselines(tasks)
-    _check_names([*names, *trivial])
+    baselines = trivial_baselines(tasks)
+    _check_names([*names, *baselines])
     if args.output is not None:
-        _make_folder(Path(args.output))
-    features, frechet_name = region_features, OWN_NAME
+        make_folder(Path(args.output))
+    features, frechet_name = region_features, REGION_GRID_NAME
     if args.inception is not None:
         features, frechet_name = partial(inception_features, path=args.inception), INCEPTION_NAME
     evaluator = Evaluator(tasks, features, args.seed)
@@ -99,10 +106,10 @@ def _evaluate(args: argparse.Namespace) -> int:
             for name, model in zip(names, models, strict=False)
         ),
         *(
-            evaluator.evaluate(name, stored_predictions(folder, Path(args.dataset), args.split))
+            evaluator.evaluate(name, load_predictions(folder, Path(args.dataset), args.split))
             for name, folder in stored
         ),
-        *(evaluator.evaluate(name, regions) for name, regions in trivial.items()),
+        *(evaluator.evaluate(name, regions) for name, regions in baselines.items()),
     ]
     table = markdown(evaluations, frechet_name)
     print(f"{len(tasks)} {args.split} tasks of {dataset.name}\n\n{table}")
@@ -111,7 +118,7 @@ def _evaluate(args: argparse.Namespace) -> int:
         "split": args.split,
         "seed": args.seed,
         "frechet": frechet_name,
-        "predictions": {one.name: one.to_dict() for one in evaluations},
+        "predictions": {evaluation.name: evaluation.to_dict() for evaluation in evaluations},
     }
     if args.json is not None:
         write_json(args.json, result)
@@ -120,7 +127,7 @@ def _evaluate(args: argparse.Namespace) -> int:
     return 0
 
 
-def _named(text: str) -> tuple[str, Path]:
+def _parse_predictions(text: str) -> tuple[str, Path]:
     name, _, folder = text.partition("=")
     if not name or not folder:
         raise ConfigError(f"--predictions takes NAME=DIR, got {text!r}")
@@ -128,20 +135,16 @@ def _named(text: str) -> tuple[str, Path]:
 
 
 def _check_names(names: list[str]) -> None:
-    twice = {name for name in names if names.count(name) > 1}
-    if twice:
-        raise ConfigError(f"two predictions are called {', '.join(sorted(twice))!r}")
+    repeated = {name for name in names if names.count(name) > 1}
+    if repeated:
+        raise ConfigError(f"two predictions are called {', '.join(sorted(repeated))!r}")
     for name in names:
-        # A picture is called after each, and the table has a line for it.
+        # It names a file, and a row of a table.
         if any(character in name for character in "/\\|\n\0"):
-            raise ConfigError(f"a prediction cannot be called {name!r}; choose a plainer name")
-
-
-def _make_folder(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError(f"cannot make the folder {folder}: {error.strerror or error}") from error
+            raise ConfigError(
+                f"a prediction cannot be called {name!r}; "
+                "choose a name without slashes, bars and line breaks"
+            )
 
 
 def _save(
@@ -149,10 +152,7 @@ def _save(
 ) -> None:
     from ..evaluation.sample_grid import save_sample_grid
 
-    try:
-        (folder / "evaluation.md").write_text(table, encoding="utf-8")
-    except OSError as error:
-        raise ConfigError(f"cannot write to {folder}: {error.strerror or error}") from error
-    write_json(str(folder / "evaluation.json"), result)
-    for one in evaluations:
-        save_sample_grid(one, tasks, folder / f"{one.name}.png")
+    write_atomically(folder / "evaluation.md", table)
+    write_json(folder / "evaluation.json", result)
+    for evaluation in evaluations:
+        save_sample_grid(evaluation, tasks, folder / f"{evaluation.name}.png")

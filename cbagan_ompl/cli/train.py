@@ -7,26 +7,25 @@ import sys
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
-import yaml
-
 from ..common.files import write_json
 from ..common.validation import check_at_least, require_torch
 from ..datasets.dataset import load_dataset
 from ..datasets.synthetic import HARD_DETOUR, TASKS_PER_MAP, SyntheticSettings
 from ..errors import ConfigError
-from ..training.config import NETWORKS, PRESETS, TrainingConfig
+from ..networks.config import NETWORKS
+from ..training.config import PRESETS, TrainingConfig
 from ..training.task_sources import DatasetSource, SyntheticSchedule, TaskSource, synthetic_source
 
 _TRAIN_HELP = """\
-Train the networks on a data set or on worlds without end, and keep the best epoch.
+Train the networks on a data set or on synthetic maps, and keep the best epoch.
 
-DATASET is a folder with train.csv, test.csv, maps/ and tasks/. With --worlds in its place maps of
-all families are drawn and labelled exactly while the networks learn, new ones in every epoch. After
-each epoch the output folder holds last.pt (to go on from with --resume), best.pt (to export) and
-log.jsonl (the scores).
+DATASET is a folder with train.csv, test.csv, maps/ and tasks/. With --synthetic in its place maps
+are generated and labelled exactly during the training, new ones in every epoch. After each epoch
+the output folder holds last.pt (to go on from with --resume), best.pt (to export) and log.jsonl
+(the scores).
 
   cbagan-ompl train DATASET --output runs/first
-  cbagan-ompl train --worlds --preset worlds --output runs/worlds
+  cbagan-ompl train --synthetic --preset synthetic --output runs/synthetic
   cbagan-ompl export runs/first/best.pt --output models/first.pt
   cbagan-ompl plan MAP --model models/first.pt
 
@@ -54,8 +53,10 @@ def add_train_parser(subparsers: Any) -> None:
     parser.set_defaults(run=_train)
     tasks = parser.add_argument_group("tasks, one of both")
     tasks.add_argument("dataset", metavar="DATASET", nargs="?", help="folder that holds train.csv")
-    tasks.add_argument("--worlds", action="store_true", help="draw tasks as they are used")
-    _add_world_options(parser.add_argument_group("with --worlds"))
+    tasks.add_argument(
+        "--synthetic", action="store_true", help="generate maps and tasks during the training"
+    )
+    _add_synthetic_options(parser.add_argument_group("with --synthetic"))
     parser.add_argument("--output", required=True, metavar="DIR", help="folder for the run's files")
     parser.add_argument(
         "--resume", action="store_true", help="go on from last.pt in the output folder"
@@ -70,7 +71,7 @@ def add_train_parser(subparsers: Any) -> None:
         "--preset",
         choices=sorted(PRESETS),
         default="best",
-        help="worlds: what the bundled model was trained with, for images of 256 pixels; best: "
+        help="synthetic: what the bundled model was trained with, for images of 256 pixels; best: "
         "the best one for the paper's data; paper: the values of the paper (default: best)",
     )
     recipe.add_argument(
@@ -80,14 +81,17 @@ def add_train_parser(subparsers: Any) -> None:
         help="cbagan, its ablations with spatial attention (sa), channel attention (ca) or none, "
         "or sagan with self-attention (default: cbagan)",
     )
-    recipe.add_argument("--config", metavar="FILE", help="JSON or YAML file with options")
+    recipe.add_argument(
+        "--config", metavar="FILE", help="JSON or YAML file with options, named as for --set"
+    )
     recipe.add_argument(
         "--set",
         nargs="+",
         action="extend",
         default=[],
         metavar="KEY=VALUE",
-        help=f"single options; known are {', '.join(TrainingConfig().to_dict())}",
+        help="single options of the networks and the training; known are "
+        f"{', '.join(TrainingConfig().to_dict())}",
     )
     recipe.add_argument("--epochs", type=int, metavar="N", help="the same as --set epochs=N")
     machine = parser.add_argument_group("machine")
@@ -101,32 +105,32 @@ def add_train_parser(subparsers: Any) -> None:
     parser.add_argument("--json", metavar="FILE", help="write the scores as JSON")
 
 
-def _add_world_options(group: Any) -> None:
+def _add_synthetic_options(group: Any) -> None:
     settings, schedule = SyntheticSettings(), SyntheticSchedule()
     for name, default, what in (
-        ("--size", settings.size, "side of the maps in pixels"),
+        ("--size", settings.size, "height and width of the maps in pixels"),
         ("--maps", schedule.maps, f"maps for each epoch, {TASKS_PER_MAP} tasks on each"),
-        ("--held-back", schedule.held_back, "maps for validation, and as many for the test"),
-        ("--jobs", schedule.jobs, "processes that draw"),
-        ("--world-seed", settings.seed, "seed of the tasks"),
+        ("--held-out", schedule.held_out, "maps for validation, and as many for the test"),
+        ("--jobs", schedule.jobs, "processes that generate maps"),
+        ("--synthetic-seed", settings.seed, "seed of the maps and tasks"),
     ):
         group.add_argument(
             name, type=int, default=default, metavar="N", help=f"{what} (default: {default})"
         )
     group.add_argument(
-        "--hard-share",
+        "--hard-fraction",
         type=float,
-        default=settings.hard_share,
+        default=settings.hard_fraction,
         metavar="F",
-        help=f"share of tasks whose way is {HARD_DETOUR} times as long as the straight line, or "
-        f"more (default: {settings.hard_share})",
+        help=f"fraction of tasks whose shortest path is at least {HARD_DETOUR} times as long as "
+        f"the straight line (default: {settings.hard_fraction})",
     )
     group.add_argument(
-        "--families",
+        "--generators",
         type=lambda text: tuple(text.split(",")),
-        default=settings.families,
+        default=settings.generators,
         metavar="A,B",
-        help=f"kinds of maps (default: all: {','.join(settings.families)})",
+        help=f"map generators to use (default: all: {','.join(settings.generators)})",
     )
 
 
@@ -147,46 +151,32 @@ def add_export_parser(subparsers: Any) -> None:
     parser.add_argument("--json", metavar="FILE", help="write the model's record as JSON")
 
 
-def recipe_of(args: argparse.Namespace) -> TrainingConfig:
-    """The recipe that the arguments of ``train`` ask for.
-
-    Raises:
-        ConfigError: an unknown option, or a value that makes no sense.
-    """
+def _recipe(args: argparse.Namespace) -> TrainingConfig:
+    """Return the recipe that the arguments of ``train`` ask for."""
     config = TrainingConfig.preset(args.preset).with_network(args.network)
     if args.config is not None:
         config = TrainingConfig.from_file(args.config, config)
-    values: dict[str, Any] = {}
-    for assignment in args.set:
-        name, equals, text = assignment.partition("=")
-        if not equals:
-            raise ConfigError(f"--set takes KEY=VALUE, got {assignment!r}")
-        try:
-            values[name] = yaml.safe_load(text)
-        except yaml.YAMLError as error:
-            raise ConfigError(f"--set {assignment}: cannot read the value ({error})") from error
-    if args.epochs is not None:
-        values["epochs"] = args.epochs
-    return config.updated(values)
+    config = config.with_assignments(args.set)
+    return config if args.epochs is None else config.updated({"epochs": args.epochs})
 
 
 def _train(args: argparse.Namespace) -> int:
-    config = recipe_of(args)
+    config = _recipe(args)
     if args.threads is not None:
         check_at_least("--threads", args.threads, 1)
-    if args.worlds == (args.dataset is not None):
-        raise ConfigError("tasks come from a DATASET or from --worlds: give one of both")
+    if args.synthetic == (args.dataset is not None):
+        raise ConfigError("tasks come from a DATASET or from --synthetic: give one of both")
     require_torch()
     import torch
 
-    from ..training.distributed import leads
+    from ..training.distributed import is_leading_process
     from ..training.loop import train
 
     if args.threads is not None:
         torch.set_num_threads(args.threads)
     try:
         with _source(args, config) as source:
-            if leads():
+            if is_leading_process():
                 values = source.description()
                 print(
                     f"{values['train_tasks']} training tasks an epoch, "
@@ -204,7 +194,7 @@ def _train(args: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         print("interrupted; go on with the same command and --resume", file=sys.stderr)
         return 130
-    if not leads():
+    if not is_leading_process():
         return 0
     _print_scores(result)
     if args.json is not None:
@@ -213,14 +203,16 @@ def _train(args: argparse.Namespace) -> int:
 
 
 def _source(args: argparse.Namespace, config: TrainingConfig) -> AbstractContextManager[TaskSource]:
-    """The tasks that the arguments of ``train`` ask for."""
-    if args.worlds:
-        # Before the first worlds are drawn, which takes a while.
+    """Return the source of the tasks that the arguments of ``train`` ask for."""
+    if args.synthetic:
+        # Before the first maps are generated, which takes a while.
         from ..training.batches import check_trainable
 
         check_trainable(args.size, config)
-        settings = SyntheticSettings(args.size, args.families, args.hard_share, args.world_seed)
-        return synthetic_source(settings, SyntheticSchedule(args.maps, args.held_back, args.jobs))
+        settings = SyntheticSettings(
+            args.size, args.generators, args.hard_fraction, args.synthetic_seed
+        )
+        return synthetic_source(settings, SyntheticSchedule(args.maps, args.held_out, args.jobs))
     dataset = load_dataset(args.dataset)
     return nullcontext(DatasetSource(dataset, config.validation_fraction, config.seed))
 

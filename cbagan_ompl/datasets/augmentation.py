@@ -1,4 +1,7 @@
-"""Further maps from one: the augmentation of the paper (its table of data augmentation)."""
+"""Augmentation of maps, as in the CBAGAN-RRT paper (https://arxiv.org/abs/2305.10442).
+
+The values below are those of the paper's table of data augmentation, where it gives one.
+"""
 
 from __future__ import annotations
 
@@ -6,40 +9,48 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..map_generators import without_pockets
+from ..map_generators import fill_pockets
 
-#: Height and width shift of the paper's table, in pixels, in steps of 1.
+#: Largest shift of height and width in pixels, in steps of 1.
 SHIFT = 2
-#: Rotation probability of the paper's table; the angle is uniform over the circle.
+#: Probability of a rotation; its angle is uniform over the full circle.
 ROTATION_PROBABILITY = 0.5
 #: Largest shear angle in degrees; the paper names shearing and gives no number.
 SHEAR = 5.0
 
 
-def augmented(free: NDArray[np.bool_], rng: np.random.Generator) -> NDArray[np.bool_]:
-    """A copy of a map, shifted, sheared, and turned with probability one half.
+def augment(free: NDArray[np.bool_], rng: np.random.Generator) -> NDArray[np.bool_]:
+    """Return a copy of a map, shifted, sheared, and rotated with probability one half.
 
-    What comes in from outside is free, as the ground around the obstacles of the published maps
-    is. Pockets that this cuts off are filled. The paper also rescales and changes the brightness
-    of its images; on a map of free and blocked that does nothing, so it is left out.
+    Pixels that come in from outside are free, like the pixels around the obstacles of the published
+    maps. Pockets that the change cuts off are filled. The paper also rescales and changes the
+    brightness of its images; that leaves a map of free and blocked pixels as it is, so it is left
+    out.
 
     Args:
         free: (S, S), true where free.
-        rng: draws the change.
+        rng: source of all random numbers.
+
+    Returns:
+        (S, S), true where free.
+
+    Example:
+        >>> augment(np.ones((64, 64), dtype=bool), np.random.default_rng(0)).all()
+        np.True_
     """
-    side = free.shape[0]
+    size = free.shape[0]
     shift = rng.integers(-SHIFT, SHIFT + 1, size=2)
     angle = rng.uniform(0, 360) if rng.random() < ROTATION_PROBABILITY else 0.0
     shear = np.tan(np.radians(rng.uniform(-SHEAR, SHEAR)))
-    middle = (side - 1) / 2
-    turn = np.vstack((cv2.getRotationMatrix2D((middle, middle), angle, 1.0), (0, 0, 1)))
-    lean = np.array(((1, shear, shift[0] - shear * middle), (0, 1, shift[1]), (0, 0, 1)))
+    centre = (size - 1) / 2
+    rotation = np.vstack((cv2.getRotationMatrix2D((centre, centre), angle, 1.0), (0, 0, 1)))
+    shear_and_shift = np.array(((1, shear, shift[0] - shear * centre), (0, 1, shift[1]), (0, 0, 1)))
     pixels = cv2.warpAffine(
         free.astype(np.uint8),
-        (lean @ turn)[:2],
-        (side, side),
+        (shear_and_shift @ rotation)[:2],
+        (size, size),
         flags=cv2.INTER_NEAREST,
         borderMode=cv2.BORDER_CONSTANT,
         borderValue=1,
     )
-    return without_pockets(pixels.astype(np.bool_))
+    return fill_pockets(pixels.astype(np.bool_))

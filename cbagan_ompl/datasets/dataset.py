@@ -1,15 +1,16 @@
 """A training set on disk: maps, start and goal points, and the promising regions between them.
 
-The layout is the one that the (map, point, ROI) set of the paper is published in::
+The layout is that of the published (map, point, ROI) set of the CBAGAN-RRT paper
+(https://arxiv.org/abs/2305.10442)::
 
     maps/map_K.png             white free, black blocked
     tasks/map_K/task_N.png     one blue spot (start) and one red spot (goal) on white
     tasks/map_K/task_N_roi.png green region on white
     train.csv, test.csv        columns map, task, roi: the names of the three files of each task
 
-Blue is the start, whatever is said elsewhere: in every published task it is the point that
-``tasks/map_K.csv`` calls the start, and the root of the trees that made the label, which holds it
-in 99.9 % of the tasks (the red point, which a tree need only come near, in 74 %).
+Blue is the start in every published task: it is the point that ``tasks/map_K.csv`` calls the start,
+and the root of the trees that made the label. The label holds the start in 99.9 % of the tasks, and
+the goal, to which a tree need only come near, in 74 %.
 
 All images are squares of one size. They are held in memory as bytes, 80 MB for 10,000 tasks of
 64 x 64 pixels; nothing is written to disk.
@@ -18,6 +19,7 @@ All images are squares of one size. They are held in memory as bytes, 80 MB for 
 from __future__ import annotations
 
 import csv
+import io
 import re
 from dataclasses import dataclass
 from os import PathLike
@@ -28,10 +30,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.files import read_bytes, read_text
 from ..errors import DatasetError
 
+#: Columns of ``train.csv`` and ``test.csv``.
 COLUMNS = ("map", "task", "roi")
-DARK = 128
+
+# Values of a colour channel below this count as dark.
+_DARK = 128
 
 
 @dataclass(frozen=True)
@@ -40,11 +46,11 @@ class Tasks:
 
     Attributes:
         maps: (M, S, S) uint8, 1 where free.
-        map_of: (N,) index of the map of each task.
-        start: (N, 2) pixel coordinates (u, v), centre of the spot.
-        goal: (N, 2) the same.
-        region: (N, S, S), 1 in the region: uint8 0 or 1 of a data set, float16 from 0 to 1 of
-            :mod:`.worlds`.
+        map_of: (N,), index into ``maps`` for each task.
+        start: (N, 2), image coordinates (u, v) in pixels, u right, v down from the top left corner.
+        goal: (N, 2), the same.
+        region: (N, S, S), the labels: uint8 0 or 1, 1 in the region, in a data set on disk; float16
+            from 0 to 1 in synthetic tasks (:mod:`cbagan_ompl.datasets.synthetic`).
     """
 
     maps: NDArray[np.uint8]
@@ -57,8 +63,8 @@ class Tasks:
         return len(self.region)
 
     @property
-    def side(self) -> int:
-        """Side S of the images in pixels."""
+    def size(self) -> int:
+        """Width and height S of the images in pixels."""
         return int(self.region.shape[-1])
 
     @property
@@ -67,7 +73,7 @@ class Tasks:
         return self.maps[self.map_of].astype(bool)
 
     def select(self, indices: NDArray[np.int64]) -> Tasks:
-        """Some of the tasks."""
+        """Return the tasks with some indices, on the same maps."""
         return Tasks(
             self.maps,
             self.map_of[indices],
@@ -86,7 +92,7 @@ class Dataset:
         map_numbers: the number K of each map, from its file name ``map_K.png``; -1 for maps of
             other names.
         train: the tasks of ``train.csv``.
-        test: those of ``test.csv``, on the same maps.
+        test: the tasks of ``test.csv``, on the same maps.
     """
 
     name: str
@@ -95,32 +101,34 @@ class Dataset:
     test: Tasks
 
     def description(self) -> dict[str, Any]:
-        """What checkpoints and model files say about the data."""
+        """Return what checkpoints and model files record of the data."""
         return {
             "name": self.name,
             "maps": len(self.train.maps),
-            "side": self.train.side,
+            "side": self.train.size,
             "train_tasks": len(self.train),
             "test_tasks": len(self.test),
         }
 
     def split(self, fraction: float, seed: int) -> tuple[Tasks, Tasks]:
-        """The training tasks in two random parts: for training, and for validation.
+        """Split the training tasks at random.
 
         Args:
-            fraction: share of the tasks for validation, at least one task.
+            fraction: of the tasks that is held out for validation, at least one task.
             seed: the same seed gives the same parts.
 
+        Returns:
+            The tasks for training, and those for validation.
+
         Raises:
-            DatasetError: there are too few tasks to split.
+            DatasetError: there are fewer than three tasks.
         """
         if len(self.train) < 3:
             raise DatasetError(f"{self.name}: train.csv lists fewer than three tasks")
         order = np.random.default_rng(seed).permutation(len(self.train))
-        held_back = min(max(1, round(fraction * len(order))), len(order) - 2)
-        return self.train.select(np.sort(order[held_back:])), self.train.select(
-            np.sort(order[:held_back])
-        )
+        count = min(max(1, round(fraction * len(order))), len(order) - 2)
+        held_out, kept = np.sort(order[:count]), np.sort(order[count:])
+        return self.train.select(kept), self.train.select(held_out)
 
 
 def load_dataset(folder: str | PathLike[str]) -> Dataset:
@@ -131,8 +139,8 @@ def load_dataset(folder: str | PathLike[str]) -> Dataset:
 
     Raises:
         DatasetError: a file is missing or unreadable, a column is missing, a list is empty or
-            names a file elsewhere, an image differs in size from the first map, or a task has no
-            start or goal spot.
+            names a file in another folder, an image differs in size from the first map, or a task
+            has no start or goal spot.
     """
     root = Path(folder)
     if not root.is_dir():
@@ -140,18 +148,21 @@ def load_dataset(folder: str | PathLike[str]) -> Dataset:
     rows = {name: _read_rows(root / f"{name}.csv") for name in ("train", "test")}
     names = sorted({row["map"] for part in rows.values() for row in part}, key=_map_number)
     maps = _read_maps(root, names)
-    number = {name: i for i, name in enumerate(names)}
-    parts = {name: _read_tasks(root, part, maps, number) for name, part in rows.items()}
+    index = {name: i for i, name in enumerate(names)}
+    parts = {name: _read_tasks(root, part, maps, index) for name, part in rows.items()}
     numbers = tuple(_map_number(name)[0] for name in names)
     return Dataset(root.resolve().name, numbers, parts["train"], parts["test"])
 
 
 def label_files(folder: str | PathLike[str], part: str) -> list[Path]:
-    """The label of each task of ``train.csv`` or ``test.csv``, in the order of the tasks.
+    """Return the path of each label, in the order of the tasks.
 
     Args:
         folder: of the set.
         part: ``train`` or ``test``.
+
+    Raises:
+        DatasetError: the list of the tasks cannot be read.
     """
     root = Path(folder)
     return [
@@ -161,18 +172,18 @@ def label_files(folder: str | PathLike[str], part: str) -> list[Path]:
 
 
 def _map_number(name: str) -> tuple[int, str]:
-    """K of ``map_K.png``, and the name itself to tell other names apart."""
+    """Return K of ``map_K.png``, or -1, and the name itself as a key to sort by."""
     match = re.fullmatch(r"map_(\d+)", Path(name).stem)
     return int(match[1]) if match else -1, name
 
 
 def _read_rows(path: Path) -> list[dict[str, str]]:
+    text = read_text(path, DatasetError)
     try:
-        with path.open(newline="", encoding="utf-8") as file:
-            reader = csv.DictReader(file)
-            missing = set(COLUMNS) - set(reader.fieldnames or ())
-            rows = list(reader)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        reader = csv.DictReader(io.StringIO(text, newline=""))
+        missing = set(COLUMNS) - set(reader.fieldnames or ())
+        rows = list(reader)
+    except csv.Error as error:
         raise DatasetError(f"{path}: cannot read the list of tasks ({error})") from error
     if missing:
         raise DatasetError(
@@ -190,48 +201,43 @@ def _read_rows(path: Path) -> list[dict[str, str]]:
 
 def _read_maps(root: Path, names: list[str]) -> NDArray[np.uint8]:
     images = [read_image(root / "maps" / name) for name in names]
-    side = images[0].shape[0]
-    if images[0].shape[1] != side:
+    size = images[0].shape[0]
+    if images[0].shape[1] != size:
         raise DatasetError(
             f"{root}: the images of a training set are squares; {names[0]} has "
-            f"{images[0].shape[1]} x {side} pixels"
+            f"{images[0].shape[1]} x {size} pixels"
         )
     for name, image in zip(names, images, strict=True):
-        _check_size(root / "maps" / name, image, side)
-    return np.stack([(image[..., 0] >= DARK).astype(np.uint8) for image in images])
+        _check_size(root / "maps" / name, image, size)
+    return np.stack([(image[..., 0] >= _DARK).astype(np.uint8) for image in images])
 
 
 def _read_tasks(
-    root: Path, rows: list[dict[str, str]], maps: NDArray[np.uint8], number: dict[str, int]
+    root: Path, rows: list[dict[str, str]], maps: NDArray[np.uint8], map_index: dict[str, int]
 ) -> Tasks:
-    side = maps.shape[-1]
-    ends = np.empty((len(rows), 2, 2), dtype=np.float32)
-    region = np.empty((len(rows), side, side), dtype=np.uint8)
+    size = maps.shape[-1]
+    endpoints = np.empty((len(rows), 2, 2), dtype=np.float32)
+    region = np.empty((len(rows), size, size), dtype=np.uint8)
     for i, row in enumerate(rows):
         folder = root / "tasks" / Path(row["map"]).stem
         image = read_image(folder / row["task"])
-        _check_size(folder / row["task"], image, side)
-        ends[i] = _find_ends(folder / row["task"], image)
+        _check_size(folder / row["task"], image, size)
+        endpoints[i] = _find_endpoints(folder / row["task"], image)
         image = read_image(folder / row["roi"])
-        _check_size(folder / row["roi"], image, side)
-        region[i] = (image[..., 1] >= DARK) & (image[..., 0] < DARK)
-    map_of = np.array([number[row["map"]] for row in rows], dtype=np.int64)
-    return Tasks(maps, map_of, ends[:, 0].copy(), ends[:, 1].copy(), region)
+        _check_size(folder / row["roi"], image, size)
+        region[i] = (image[..., 1] >= _DARK) & (image[..., 0] < _DARK)
+    map_of = np.array([map_index[row["map"]] for row in rows], dtype=np.int64)
+    return Tasks(maps, map_of, endpoints[:, 0].copy(), endpoints[:, 1].copy(), region)
 
 
 def read_image(path: Path) -> NDArray[np.uint8]:
-    """An image as (H, W, 3), red, green, blue.
+    """Read an image as (H, W, 3), red, green, blue.
 
     Raises:
         DatasetError: it is missing, no image, or too large.
     """
-    # imread itself would print a warning for a missing file, and cannot open every path.
-    try:
-        data = np.frombuffer(path.read_bytes(), dtype=np.uint8)
-    # A path with a NUL character is a ValueError.
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise DatasetError(f"{path}: cannot read the image ({reason})") from error
+    # cv2.imread itself would print a warning for a missing file, and cannot open every path.
+    data = np.frombuffer(read_bytes(path, DatasetError), dtype=np.uint8)
     try:
         image = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
     except cv2.error as error:
@@ -241,17 +247,17 @@ def read_image(path: Path) -> NDArray[np.uint8]:
     return np.asarray(image[..., ::-1], dtype=np.uint8)
 
 
-def _check_size(path: Path, image: NDArray[np.uint8], side: int) -> None:
-    if image.shape[:2] != (side, side):
+def _check_size(path: Path, image: NDArray[np.uint8], size: int) -> None:
+    if image.shape[:2] != (size, size):
         raise DatasetError(
             f"{path}: {image.shape[1]} x {image.shape[0]} pixels, "
-            f"but the first map has {side} x {side}"
+            f"but the first map has {size} x {size}"
         )
 
 
-def _find_ends(path: Path, image: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Centres of the start's and the goal's spot as pixel coordinates (u, v), shape (2, 2)."""
-    red, blue = image[..., 0] >= DARK, image[..., 2] >= DARK
+def _find_endpoints(path: Path, image: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """Return the centres (u, v) of the spots of start and goal, shape (2, 2)."""
+    red, blue = image[..., 0] >= _DARK, image[..., 2] >= _DARK
     centres = []
     for role, colour, spot in (("start", "blue", blue & ~red), ("goal", "red", red & ~blue)):
         rows, columns = np.nonzero(spot)

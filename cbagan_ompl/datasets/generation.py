@@ -1,8 +1,7 @@
-"""New training sets: random maps, tasks on them, and labels of RRT or exact ones.
+"""New training sets: random maps, tasks on them, and labels by runs of RRT or exact ones.
 
-What a map, its tasks and their labels are depends on the seed and the number of the map alone, so
-that a set is the same whatever the number of processes and however often it was interrupted (with
-one version of OMPL).
+A map, its tasks and their labels depend on the seed and the number of the map alone. So a set is
+the same whatever the number of processes and of interruptions, with one version of OMPL.
 """
 
 from __future__ import annotations
@@ -15,72 +14,79 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.files import write_json
+from ..common.files import make_folder, read_text, write_json
 from ..common.parallel import run_all
 from ..common.validation import check_at_least, check_fraction, require
 from ..errors import ConfigError, DatasetError
-from ..map_generators import MAP_GENERATORS, MIN_SIDE, check_generators
+from ..map_generators import MAP_GENERATORS, MIN_SIZE, check_generators
 from ..map_generators.randomization import randomized_map
 from ..maps.grid_map import GridMap
 from ..sampling.heatmap import REGION_THRESHOLD, pixel_pair
-from .augmentation import augmented
+from .augmentation import augment
 from .dataset import Tasks
-from .splits import is_test_task
-from .synthetic import HARD_DETOUR, detour_heat
+from .geodesic_labels import geodesic_label
+from .splits import select_test_tasks
+from .synthetic import HARD_DETOUR
 from .writing import Row, task_row, write_lists, write_map, write_tasks
 
+#: File in the folder of a generated set that records its settings.
 RECORD = "dataset.json"
 
 #: Kinds of labels.
 LABELS = ("rrt", "geodesic")
-#: The paper's number of runs of RRT for a label.
+#: Runs of RRT for a label; the value of the CBAGAN-RRT paper.
 RUNS = 50
-#: Limit of each run, in iterations: the paper's.
+#: Limit of each run in iterations; the value of the paper.
 ITERATIONS = 5000
-#: Longest edge of RRT as a share of the map's side, one pixel at 64. Of the lengths tried (1/128 to
-#: 12/64) the short ones give labels like the published ones; half of it is twice as slow.
+#: Longest edge of RRT as a fraction of the map's size, one pixel at 64. Of the lengths tried (1/128
+#: to 12/64) the short ones give labels like the published ones; half of it is twice as slow.
 RANGE = 1 / 64
 
-_MAX_TRIES, _MAX_HARD_TRIES = 1000, 100
+# Attempts to find a task on a map, and those of them that look for a hard one.
+_MAX_ATTEMPTS, _MAX_HARD_ATTEMPTS = 1000, 100
 
 
 @dataclass(frozen=True)
 class GenerationSettings:
-    """What decides a generated set.
+    """Settings of a generated set.
 
     Attributes:
         maps: number of maps.
-        tasks: on each map.
-        size: side of the maps in pixels.
-        families: names from :data:`cbagan_ompl.map_generators.MAP_GENERATORS`, taken in turn.
-        varied: scale, turn and wear each original, see
+        tasks: number of tasks on each map.
+        size: width and height of the maps in pixels.
+        generators: keys of :data:`cbagan_ompl.map_generators.MAP_GENERATORS`, taken in turn.
+        varied: change each original map at random, see
             :mod:`cbagan_ompl.map_generators.randomization`.
         copies: maps from each original; the first is the original itself, the others are
-            augmented (10 in the paper).
+            augmented (10 in the CBAGAN-RRT paper).
         label: ``rrt``, the union of the paths of many runs, as in the paper; or ``geodesic``, the
-            region of :func:`cbagan_ompl.datasets.synthetic.detour_heat`.
-        hard_share: share of tasks whose shortest way is at least
+            region of :func:`cbagan_ompl.datasets.geodesic_labels.geodesic_label`.
+        hard_fraction: fraction of tasks whose shortest path is at least
             :data:`cbagan_ompl.datasets.synthetic.HARD_DETOUR` times as long as the straight line,
-            where a map has such tasks; the others are as they come.
+            where a map has such tasks; the other tasks may be hard or easy.
         runs: of RRT for each label.
         range: longest edge of RRT in pixels; None for ``size`` / 64.
-        min_distance: least distance from start to goal as a share of the side.
-        split: see :func:`cbagan_ompl.datasets.splits.is_test_task`.
-        test_fraction: share of the tasks, or of the original maps, for testing.
-        seed: of everything.
+        min_distance: least distance from start to goal as a fraction of the size.
+        split: see :func:`cbagan_ompl.datasets.splits.select_test_tasks`.
+        test_fraction: fraction of the tasks, or of the original maps, for testing.
+        seed: of all random numbers.
 
     Raises:
-        ConfigError: an option that makes no sense.
+        ConfigError: a setting out of range, or an unknown name.
+
+    Example:
+        >>> GenerationSettings(size=128).longest_edge
+        2.0
     """
 
     maps: int = 100
     tasks: int = 100
     size: int = 64
-    families: tuple[str, ...] = tuple(MAP_GENERATORS)
+    generators: tuple[str, ...] = tuple(MAP_GENERATORS)
     varied: bool = False
     copies: int = 1
     label: str = LABELS[0]
-    hard_share: float = 0.0
+    hard_fraction: float = 0.0
     runs: int = RUNS
     range: float | None = None
     min_distance: float = 0.25
@@ -91,64 +97,68 @@ class GenerationSettings:
     def __post_init__(self) -> None:
         for name in ("maps", "tasks", "copies", "runs"):
             check_at_least(name, getattr(self, name), 1)
-        check_at_least("size", self.size, MIN_SIDE)
-        check_generators(self.families)
+        check_at_least("size", self.size, MIN_SIZE)
+        check_generators(self.generators)
         if self.label not in LABELS:
             raise ConfigError(f"a label is one of {', '.join(LABELS)}, got {self.label!r}")
-        check_fraction("hard_share", self.hard_share)
+        check_fraction("hard_fraction", self.hard_fraction)
         if self.range is not None and not 0 < self.range < float("inf"):
             raise ConfigError(f"range must be above 0, got {self.range}")
         if not 0 <= self.min_distance < 1:
             raise ConfigError(
-                f"min_distance is a share of the map's side, from 0 to below 1, "
+                f"min_distance is a fraction of the map's size, from 0 to below 1, "
                 f"got {self.min_distance}"
             )
-        # Refuses a seed or a split that cannot be before the work is done.
-        is_test_task(self.split, self.originals(), self.test_fraction, self.seed)
-
-    def originals(self) -> NDArray[np.int64]:
-        """For each task the number of its original map, shape (maps * tasks,)."""
-        return (np.arange(self.maps) // self.copies).repeat(self.tasks)
+        # Raises for an impossible seed or split before any work is done.
+        self.select_test_tasks()
 
     @property
     def needs_distances(self) -> bool:
-        """Whether tasks or labels are made from shortest ways."""
-        return self.label == "geodesic" or self.hard_share > 0
+        """Whether tasks or labels are made from geodesic distances."""
+        return self.label == "geodesic" or self.hard_fraction > 0
 
     @property
     def longest_edge(self) -> float:
         """Longest edge of RRT in pixels."""
         return self.size * RANGE if self.range is None else self.range
 
+    def select_test_tasks(self) -> NDArray[np.bool_]:
+        """Return which of all tasks, map after map, are for testing, (maps * tasks,)."""
+        originals = (np.arange(self.maps) // self.copies).repeat(self.tasks)
+        return select_test_tasks(self.split, originals, self.test_fraction, self.seed)
+
 
 def generate(
     folder: Path, settings: GenerationSettings, jobs: int, resume: bool, progress: bool = True
 ) -> None:
-    """Make a training set.
+    """Generate a training set.
 
     Args:
-        folder: where to; made if missing.
-        settings: what kind of set.
-        jobs: processes at a time.
-        resume: go on in a folder where a run was interrupted: only missing maps are made.
+        folder: of the set; made if missing.
+        settings: of the set.
+        jobs: number of processes.
+        resume: continue in a folder where a run was interrupted: only missing maps are made.
         progress: show a progress bar.
 
     Raises:
         ConfigError: ``resume`` with other settings, or without it although the folder holds a set.
-        MissingDependencyError: shortest ways are needed, and numba is not installed.
+        MissingDependencyError: geodesic distances are needed, and numba is not installed.
         DatasetError: a file cannot be written, or a map has no task of the wanted distance.
     """
     if settings.needs_distances:
         require("numba", "train")
-    _prepare(folder, settings, resume)
+    _prepare_folder(folder, settings, resume)
     missing = [k for k in range(settings.maps) if not _task_list(folder, k).is_file()]
-    run_all(_make_map, [(folder, settings, k) for k in missing], jobs, "maps", progress)
+    run_all(_write_map_and_tasks, [(folder, settings, k) for k in missing], jobs, "maps", progress)
     rows: list[Row] = [task_row(k, n) for k in range(settings.maps) for n in range(settings.tasks)]
-    test = is_test_task(settings.split, settings.originals(), settings.test_fraction, settings.seed)
-    write_lists(folder, rows, test)
+    write_lists(folder, rows, settings.select_test_tasks())
 
 
-def _prepare(folder: Path, settings: GenerationSettings, resume: bool) -> None:
+def _prepare_folder(folder: Path, settings: GenerationSettings, resume: bool) -> None:
+    """Make the folder and its record, or check the record that is there.
+
+    The record also names the version of OMPL: RRT's labels differ between versions.
+    """
     from ..planning.compat import ompl_version
 
     record = folder / RECORD
@@ -163,17 +173,14 @@ def _prepare(folder: Path, settings: GenerationSettings, resume: bool) -> None:
                 f"{record} was written with other options or another OMPL; go on with the same"
             )
         return
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise DatasetError(f"cannot make the folder {folder}: {error.strerror or error}") from error
-    write_json(str(record), made_by)
+    make_folder(folder, DatasetError)
+    write_json(record, made_by)
 
 
 def _read_record(path: Path) -> Any:
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        return json.loads(read_text(path, DatasetError))
+    except ValueError as error:
         raise DatasetError(f"{path}: cannot read how the set was made ({error})") from error
 
 
@@ -181,82 +188,86 @@ def _task_list(folder: Path, number: int) -> Path:
     return folder / "tasks" / f"map_{number}.csv"
 
 
-def _make_map(folder: Path, settings: GenerationSettings, number: int) -> None:
-    """Draw a map and its tasks, label them, and write all of it."""
-    free = draw_map(settings, number)
+def _write_map_and_tasks(folder: Path, settings: GenerationSettings, number: int) -> None:
+    """Generate a map, its tasks and their labels, and write them."""
+    free = generate_map(settings, number)
     grid = GridMap(free)
     rng = np.random.default_rng((settings.seed, number, 1))
-    drawn = [_draw_task(grid, settings, rng) for _ in range(settings.tasks)]
+    labelled = [_generate_task(grid, settings, rng) for _ in range(settings.tasks)]
     write_map(folder, number, free)
     tasks = Tasks(
         free[None].astype(np.uint8),
         np.zeros(settings.tasks, dtype=np.int64),
-        np.array([ends[0] for ends, _ in drawn], dtype=np.float32),
-        np.array([ends[1] for ends, _ in drawn], dtype=np.float32),
-        np.array([region for _, region in drawn], dtype=np.uint8),
+        np.array([endpoints[0] for endpoints, _ in labelled], dtype=np.float32),
+        np.array([endpoints[1] for endpoints, _ in labelled], dtype=np.float32),
+        np.array([region for _, region in labelled], dtype=np.uint8),
     )
     write_tasks(folder, number, tasks)
 
 
-def draw_map(settings: GenerationSettings, number: int) -> NDArray[np.bool_]:
-    """A map of a set, (S, S), true where free.
+def generate_map(settings: GenerationSettings, number: int) -> NDArray[np.bool_]:
+    """Generate a map of a set.
 
     Args:
         settings: of the set.
         number: of the map, from 0.
+
+    Returns:
+        (S, S), true where free.
     """
     original, copy = divmod(number, settings.copies)
-    family = settings.families[original % len(settings.families)]
+    name = settings.generators[original % len(settings.generators)]
     rng = np.random.default_rng((settings.seed, original))
     if settings.varied:
-        free = randomized_map(rng, settings.size, [family])
+        free = randomized_map(rng, settings.size, [name])
     else:
-        free = MAP_GENERATORS[family](rng, settings.size, settings.size)
-    return augmented(free, np.random.default_rng((settings.seed, original, copy))) if copy else free
+        free = MAP_GENERATORS[name](rng, settings.size, settings.size)
+    return augment(free, np.random.default_rng((settings.seed, original, copy))) if copy else free
 
 
-def _draw_task(
+def _generate_task(
     grid: GridMap, settings: GenerationSettings, rng: np.random.Generator
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Start and goal, (2, 2), and their region; drawn again until they are joined."""
+    """Sample start and goal, (2, 2), until a path connects them; return them and their region."""
     rows, columns = np.nonzero(grid.free)
     points = (np.stack((columns, rows), axis=-1) + 0.5).astype(np.float64)
-    hard = settings.hard_share > 0 and rng.random() < settings.hard_share
-    for attempt in range(_MAX_TRIES):
-        ends = points[rng.integers(len(points), size=2)]
+    hard = settings.hard_fraction > 0 and rng.random() < settings.hard_fraction
+    for attempt in range(_MAX_ATTEMPTS):
+        endpoints = points[rng.integers(len(points), size=2)]
         seed = int(rng.integers(2**32))
-        if np.hypot(*(ends[1] - ends[0])) < max(settings.min_distance * settings.size, 1):
+        if np.hypot(*(endpoints[1] - endpoints[0])) < max(settings.min_distance * settings.size, 1):
             continue
         # Some maps have no hard tasks.
-        if hard and attempt < _MAX_HARD_TRIES and not _is_hard(grid, ends):
+        if hard and attempt < _MAX_HARD_ATTEMPTS and not _is_hard(grid, endpoints):
             continue
-        region = _label(grid, ends, settings, seed)
+        region = _label_task(grid, endpoints, settings, seed)
         if region.any():
-            return ends, region
+            return endpoints, region
     raise DatasetError(
-        f"found no task of at least {settings.min_distance:g} of the side on a map; "
+        f"found no task of at least {settings.min_distance:g} of the map's size; "
         "ask for a smaller distance"
     )
 
 
-def _is_hard(grid: GridMap, ends: NDArray[np.float64]) -> bool:
-    from .geodesic import distances
+def _is_hard(grid: GridMap, endpoints: NDArray[np.float64]) -> bool:
+    from .geodesic import distance_field
 
-    start, goal = pixel_pair(ends)
-    shortest = distances(grid.free, start)[goal[1], goal[0]]
-    return bool(HARD_DETOUR * np.hypot(*(ends[1] - ends[0])) <= shortest < np.inf)
+    start, goal = pixel_pair(endpoints)
+    shortest = distance_field(grid.free, start)[goal[1], goal[0]]
+    return bool(HARD_DETOUR * np.hypot(*(endpoints[1] - endpoints[0])) <= shortest < np.inf)
 
 
-def _label(
-    grid: GridMap, ends: NDArray[np.float64], settings: GenerationSettings, seed: int
+def _label_task(
+    grid: GridMap, endpoints: NDArray[np.float64], settings: GenerationSettings, seed: int
 ) -> NDArray[np.bool_]:
+    """Return the region of a task; empty where no path was found."""
     if settings.label == "geodesic":
-        from .geodesic import distances
+        from .geodesic import distance_field
 
-        start, goal = pixel_pair(ends)
-        fields = distances(grid.free, start), distances(grid.free, goal)
-        return detour_heat(*fields, goal) >= REGION_THRESHOLD
+        start, goal = pixel_pair(endpoints)
+        fields = distance_field(grid.free, start), distance_field(grid.free, goal)
+        return geodesic_label(*fields, goal) >= REGION_THRESHOLD
     from .rrt_labels import rrt_region
 
-    task = grid.check_task(*ends)
+    task = grid.check_task(*endpoints)
     return rrt_region(grid, task, settings.runs, settings.longest_edge, ITERATIONS, seed)

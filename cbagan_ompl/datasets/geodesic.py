@@ -1,7 +1,8 @@
-"""Lengths of shortest ways on a grid, at any angle.
+"""Geodesic distances on a grid: lengths of shortest paths at any angle. Needs numba.
 
-The eikonal equation |grad D| = 1 on the free pixels, solved by fast sweeping (Zhao, "A fast
-sweeping method for eikonal equations", 2005), a first-order scheme.
+The distance D from a source solves the eikonal equation |grad D| = 1 on the free pixels. It is
+solved by fast sweeping, a first-order scheme: H. Zhao, "A fast sweeping method for eikonal
+equations", Mathematics of Computation 74, 2005, https://doi.org/10.1090/S0025-5718-04-01678-3.
 """
 
 from __future__ import annotations
@@ -12,28 +13,32 @@ from numba import njit
 from numpy.typing import NDArray
 
 # Sweeps end when no distance changes by more than this, in pixels.
-_SETTLED = 1e-3
-# The distances are exact in a disc without obstacles around the source, at most this wide, where
-# the scheme would err most.
-_DISC = 12.0
+_TOLERANCE = 1e-3
+# The scheme errs most beside the source. So distances are set exactly in a disc without obstacles
+# around it, whose radius in pixels is at most this.
+_EXACT_RADIUS = 12.0
 
 
-def distances(free: NDArray[np.bool_], source: tuple[int, int]) -> NDArray[np.float32]:
-    """Length of the shortest way from a pixel to every other one.
+def distance_field(free: NDArray[np.bool_], source: tuple[int, int]) -> NDArray[np.float32]:
+    """Return the length of the shortest path from a pixel to every other one.
 
     Args:
         free: (H, W), true where free.
         source: (column, row) of a free pixel.
 
     Returns:
-        (H, W) in pixels, infinite where no 4-connected way leads.
+        (H, W) in pixels, infinite on obstacles and where no 4-connected path leads.
+
+    Example:
+        >>> distance_field(np.ones((5, 5), dtype=bool), (0, 0))[0].tolist()
+        [0.0, 1.0, 2.0, 3.0, 4.0]
     """
     column, row = source
     padded = np.full((free.shape[0] + 2, free.shape[1] + 2), np.inf, np.float32)
     clearance = cv2.distanceTransform(
         np.pad(free, 1).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE
     )
-    radius = min(_DISC, float(clearance[row + 1, column + 1]) - 1)
+    radius = min(_EXACT_RADIUS, float(clearance[row + 1, column + 1]) - 1)
     rows, columns = np.ogrid[-1 : free.shape[0] + 1, -1 : free.shape[1] + 1]
     exact = np.hypot(rows - row, columns - column)
     near = exact <= max(0.0, radius)
@@ -46,7 +51,7 @@ def distances(free: NDArray[np.bool_], source: tuple[int, int]) -> NDArray[np.fl
 def _sweep(
     free: NDArray[np.bool_], values: NDArray[np.float32], fixed: NDArray[np.bool_]
 ) -> None:  # pragma: no cover
-    """Gauss-Seidel sweeps in the four diagonal directions until nothing changes."""
+    """Sweep in the four diagonal directions, each value at once in place, until none changes."""
     height, width = free.shape
     changed = True
     while changed:
@@ -63,8 +68,9 @@ def _sweep(
                     b = min(values[y - 1, x], values[y + 1, x])
                     if a > b:
                         a, b = b, a
-                    slanted = (a + b + np.sqrt(max(0.0, 2 - (a - b) * (a - b)))) / 2
-                    best = slanted if b - a < 1 else a + 1
-                    if best < values[y, x] - _SETTLED:
+                    # The solution of (d - a)^2 + (d - b)^2 = 1, or of d - a = 1 if b is too large.
+                    two_sided = (a + b + np.sqrt(max(0.0, 2 - (a - b) * (a - b)))) / 2
+                    best = two_sided if b - a < 1 else a + 1
+                    if best < values[y, x] - _TOLERANCE:
                         values[y, x] = best
                         changed = True

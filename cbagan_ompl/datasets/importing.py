@@ -1,4 +1,4 @@
-"""Sets that others have published: unpacked, checked, and split anew."""
+"""Importing published training sets: unpack, check, describe, and split them again."""
 
 from __future__ import annotations
 
@@ -13,18 +13,34 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.files import reason
 from ..common.validation import check_at_least
 from ..errors import ConfigError, DatasetError
-from ..evaluation.metrics import connects
+from ..maps.connectivity import connects
 from .dataset import Dataset, Tasks, load_dataset
-from .splits import is_test_task
+from .splits import select_test_tasks
 from .writing import task_row, write_lists, write_map, write_tasks
 
+#: The split that leaves the lists of a set as they are.
 KEEP = "keep"
 
+# What damaged or encrypted archives raise; ``zipfile`` has no root for its own.
+_UNREADABLE = (
+    OSError,
+    EOFError,
+    tarfile.TarError,
+    zipfile.BadZipFile,
+    zlib.error,
+    RuntimeError,
+    ValueError,
+)
 
-def read_set(path: Path) -> Dataset:
-    """The set in a folder, or in an archive (.tar, .tar.gz, .zip) that holds it in any folder.
+
+def import_dataset(path: Path) -> Dataset:
+    """Read the set in a folder, or in an archive that holds it in any of its folders.
+
+    Args:
+        path: of the folder, or of the archive (.tar, .tar.gz, .zip).
 
     Raises:
         DatasetError: it cannot be read, see :func:`cbagan_ompl.datasets.dataset.load_dataset`, or
@@ -33,7 +49,7 @@ def read_set(path: Path) -> Dataset:
     if path.is_dir():
         return load_dataset(path)
     with TemporaryDirectory() as temporary:
-        # A set that has no folder in the archive is called as the archive is.
+        # A set without a folder in the archive takes the archive's name.
         folder = Path(temporary) / path.name.split(".")[0]
         _unpack(path, folder)
         lists = list(folder.rglob("train.csv"))
@@ -52,7 +68,7 @@ def _unpack(path: Path, folder: Path) -> None:
     try:
         if zipfile.is_zipfile(path):
             with zipfile.ZipFile(path) as zipped:
-                zipped.extractall(folder)  # leaves out what would lead out of the folder
+                zipped.extractall(folder)  # never writes outside the folder
             return
         with tarfile.open(path) as archive:
             if not hasattr(tarfile, "data_filter"):
@@ -63,36 +79,23 @@ def _unpack(path: Path, folder: Path) -> None:
                 )
             archive.extractall(folder, filter="data")
     except _UNREADABLE as error:
-        reason = getattr(error, "strerror", None) or error
         raise DatasetError(
-            f"{path}: neither a folder nor an archive that can be unpacked ({reason})"
+            f"{path}: neither a folder nor an archive that can be unpacked ({reason(error)})"
         ) from error
 
 
-#: What damaged or encrypted archives raise; ``zipfile`` has no root for its own.
-_UNREADABLE = (
-    OSError,
-    EOFError,
-    tarfile.TarError,
-    zipfile.BadZipFile,
-    zlib.error,
-    RuntimeError,
-    ValueError,
-)
-
-
-def described(dataset: Dataset) -> dict[str, Any]:
-    """What a set is, for people who think of training with it.
+def describe(dataset: Dataset) -> dict[str, Any]:
+    """Return figures that tell how well a set is suited for training.
 
     Returns:
-        Counts of maps and tasks, ``shared_maps`` (those with tasks in both lists: of these the
-        test tells how well a network knows them, not how it does on others),
-        ``repeated_tasks`` (test tasks that are in training as well), ``region_share`` (of free
-        space), ``joined`` (share of the labels in whose free pixels start and goal are joined),
-        ``blocked_ends`` (tasks that start or end in an obstacle).
+        Counts of maps and tasks, ``shared_maps`` (maps with tasks in both lists; the score on
+        these does not tell how a network does on unseen maps), ``repeated_tasks`` (test tasks that
+        are in training as well), ``region_share`` (fraction of free space in the regions),
+        ``joined`` (fraction of labels in which start and goal are connected through free pixels,
+        8-connected), ``blocked_ends`` (tasks with a blocked start or goal).
     """
     train, test = dataset.train, dataset.test
-    known = {_key(train, i) for i in range(len(train))}
+    trained = {_task_key(train, i) for i in range(len(train))}
     both = (train, test)
     masks = [(tasks.free, tasks.region.astype(bool)) for tasks in both]
     free = sum(int(free.sum()) for free, _ in masks)
@@ -100,32 +103,33 @@ def described(dataset: Dataset) -> dict[str, Any]:
     return {
         **dataset.description(),
         "shared_maps": len(set(train.map_of.tolist()) & set(test.map_of.tolist())),
-        "repeated_tasks": sum(_key(test, i) in known for i in range(len(test))),
+        "repeated_tasks": sum(_task_key(test, i) in trained for i in range(len(test))),
         "region_share": region / free,
         "joined": float(
-            np.mean([_is_joined(tasks, i) for tasks in both for i in range(len(tasks))])
+            np.mean([_is_connected(tasks, i) for tasks in both for i in range(len(tasks))])
         ),
         "blocked_ends": sum(_is_blocked(tasks, i) for tasks in both for i in range(len(tasks))),
     }
 
 
-def _key(tasks: Tasks, i: int) -> tuple[int, bytes, bytes]:
+def _task_key(tasks: Tasks, i: int) -> tuple[int, bytes, bytes]:
     return int(tasks.map_of[i]), tasks.start[i].tobytes(), tasks.goal[i].tobytes()
 
 
-def _ends(tasks: Tasks, i: int) -> tuple[tuple[int, int], tuple[int, int]]:
-    (u, v), (x, y) = (end[i].astype(int).tolist() for end in (tasks.start, tasks.goal))
+def _endpoint_pixels(tasks: Tasks, i: int) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Return the pixels (column, row) of start and goal."""
+    (u, v), (x, y) = (points[i].astype(int).tolist() for points in (tasks.start, tasks.goal))
     return (u, v), (x, y)
 
 
-def _is_joined(tasks: Tasks, i: int) -> bool:
+def _is_connected(tasks: Tasks, i: int) -> bool:
     inside = (tasks.region[i] & tasks.maps[tasks.map_of[i]]).astype(np.bool_)
-    return connects(inside, *_ends(tasks, i))
+    return connects(inside, *_endpoint_pixels(tasks, i), connectivity=8)
 
 
 def _is_blocked(tasks: Tasks, i: int) -> bool:
     free = tasks.maps[tasks.map_of[i]]
-    return not all(free[row, column] for column, row in _ends(tasks, i))
+    return not all(free[row, column] for column, row in _endpoint_pixels(tasks, i))
 
 
 def write_dataset(
@@ -136,19 +140,19 @@ def write_dataset(
     test_fraction: float = 0.2,
     seed: int = 0,
 ) -> None:
-    """Write a set in the published layout, its tasks numbered anew.
+    """Write a set in the published layout, with its tasks renumbered.
 
-    The maps keep their numbers, which tell whose copies they are; where not all are called
-    ``map_K.png``, or two have the same number, they are numbered anew too.
+    The maps keep their numbers, which tell the copies of one original. They are renumbered too
+    where not all are called ``map_K.png``, or two have the same number.
 
     Args:
-        folder: where to; must not hold a set yet.
+        folder: of the new set; must not hold a set yet.
         dataset: the set.
         split: ``keep`` for the lists as they are, or see
-            :func:`cbagan_ompl.datasets.splits.is_test_task`.
-        copies: so many maps in a row (by their number) are copies of one original: 10 in the
-            published set. They stay on one side of a split by map.
-        test_fraction: share of the tasks, or of the original maps, for testing.
+            :func:`cbagan_ompl.datasets.splits.select_test_tasks`.
+        copies: this many maps with consecutive numbers are copies of one original: 10 in the
+            published set. A split by map keeps them together.
+        test_fraction: fraction of the tasks, or of the original maps, for testing.
         seed: of the split.
 
     Raises:
@@ -158,14 +162,13 @@ def write_dataset(
     if (folder / "train.csv").exists():
         raise ConfigError(f"{folder} holds a set already; choose another folder")
     check_at_least("copies", copies, 1)
-    tasks, was_test = _together(dataset)
+    tasks, was_test = _concatenate_parts(dataset)
     order = np.argsort(tasks.map_of, kind="stable")
     tasks, was_test = tasks.select(order), was_test[order]
     is_test = was_test
     if split != KEEP:
-        is_test = is_test_task(
-            split, _originals(dataset, copies)[tasks.map_of], test_fraction, seed
-        )
+        originals = _original_numbers(dataset, copies)[tasks.map_of]
+        is_test = select_test_tasks(split, originals, test_fraction, seed)
     numbers = dataset.map_numbers
     if min(numbers) < 0 or len(set(numbers)) < len(numbers):
         numbers = tuple(range(len(numbers)))
@@ -178,25 +181,25 @@ def write_dataset(
     write_lists(folder, rows, is_test)
 
 
-def _originals(dataset: Dataset, copies: int) -> NDArray[np.int64]:
-    """The number of the original of each map, (M,)."""
+def _original_numbers(dataset: Dataset, copies: int) -> NDArray[np.int64]:
+    """Return the number of the original of each map, (M,)."""
     if copies == 1:
         return np.arange(len(dataset.map_numbers))
     if min(dataset.map_numbers) < 0:
         raise ConfigError(
-            f"{copies} copies of each original cannot be told: the maps are not called map_K.png"
+            "cannot tell which maps are copies of one original: they are not called map_K.png"
         )
     return np.array(dataset.map_numbers) // copies
 
 
-def _together(dataset: Dataset) -> tuple[Tasks, NDArray[np.bool_]]:
-    """All tasks of a set, and which of them are for testing."""
+def _concatenate_parts(dataset: Dataset) -> tuple[Tasks, NDArray[np.bool_]]:
+    """Return all tasks of a set, and which of them are for testing, (N,)."""
     train, test = dataset.train, dataset.test
-    together = Tasks(
+    tasks = Tasks(
         train.maps,
         *(
             np.concatenate((getattr(train, name), getattr(test, name)))
             for name in ("map_of", "start", "goal", "region")
         ),
     )
-    return together, np.repeat((False, True), (len(train), len(test)))
+    return tasks, np.repeat((False, True), (len(train), len(test)))

@@ -1,4 +1,4 @@
-"""Which tasks are for training and which for testing."""
+"""Splits of tasks into those for training and those for testing."""
 
 from __future__ import annotations
 
@@ -8,33 +8,39 @@ from numpy.typing import NDArray
 from ..common.validation import check_at_least
 from ..errors import ConfigError
 
+#: Kinds of splits, see :func:`select_test_tasks`.
 SPLITS = ("task", "map")
 
 
-def is_test_task(
+def select_test_tasks(
     split: str, originals: NDArray[np.int64], fraction: float, seed: int
 ) -> NDArray[np.bool_]:
-    """Choose the tasks for testing.
+    """Select the tasks for testing at random.
 
     Args:
-        split: ``task`` draws single tasks, as the paper does, so that the maps of the test tasks
-            are in training too; ``map`` draws original maps with all their copies and tasks.
+        split: ``task`` selects single tasks, as the CBAGAN-RRT paper does, so that the maps of the
+            test tasks are in training too; ``map`` selects original maps with all their copies and
+            tasks.
         originals: (N,), for each task the number of the original of its map: maps that are
-            copies of one another, shifted or turned, have the same.
-        fraction: share of the tasks, or of the originals, at least one of them.
-        seed: the same seed gives the same choice.
+            augmented copies of one original have the same number.
+        fraction: of the tasks, or of the original maps; at least one of them is selected.
+        seed: the same seed gives the same selection.
 
     Returns:
         (N,), true for testing.
 
     Raises:
-        ConfigError: an unknown split, a fraction that is none, a single original to split, or a
-            negative seed.
+        ConfigError: an unknown split, a fraction that is not between 0 and 1, a single task or
+            original map, or a negative seed.
+
+    Example:
+        >>> select_test_tasks("map", np.array([0, 0, 1, 1]), 0.5, seed=0).sum()
+        np.int64(2)
     """
     if split not in SPLITS:
         raise ConfigError(f"a split is one of {', '.join(SPLITS)}, got {split!r}")
     if not 0 < fraction < 1:
-        raise ConfigError(f"the share of test tasks is between 0 and 1, got {fraction}")
+        raise ConfigError(f"the fraction of test tasks is between 0 and 1, got {fraction}")
     check_at_least("seed", seed, 0)
     units = np.arange(len(originals)) if split == "task" else originals
     different = np.unique(units)
@@ -42,5 +48,5 @@ def is_test_task(
         what = "task" if split == "task" else "original map"
         raise ConfigError(f"a split by {split} needs two {what}s, there is {len(different)}")
     count = min(max(1, round(fraction * len(different))), len(different) - 1)
-    chosen = np.random.default_rng(seed).permutation(different)[:count]
-    return np.isin(units, chosen)
+    selected = np.random.default_rng(seed).permutation(different)[:count]
+    return np.isin(units, selected)

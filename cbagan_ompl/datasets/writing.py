@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -12,12 +11,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.files import make_folder, write_atomically
 from ..errors import DatasetError
 from .dataset import COLUMNS, Tasks
 
-#: Columns of ``tasks/map_K.csv``: row and column of start and goal, and their distance.
+#: Columns of ``tasks/map_K.csv``: row and column of start and goal, and their distance in pixels.
 TASK_COLUMNS = ("istart", "jstart", "igoal", "jgoal", "euclid")
 
+#: Names of a task's files: map, task, region.
 Row = tuple[str, str, str]
 
 
@@ -28,35 +29,46 @@ def write_map(root: Path, number: int, free: NDArray[np.bool_ | np.uint8]) -> No
         root: folder of the set.
         number: K.
         free: (S, S), true where free.
+
+    Raises:
+        DatasetError: it cannot be written.
     """
     pixels = np.where(free[..., None], 255, 0).astype(np.uint8).repeat(3, axis=2)
     write_image(root / "maps" / f"map_{number}.png", pixels)
 
 
 def write_tasks(root: Path, number: int, tasks: Tasks) -> None:
-    """Write the tasks of one map, last of all their list, which says that they are complete.
+    """Write the tasks of one map, and last of all their list, which marks them as complete.
 
     Args:
         root: folder of the set.
         number: K of the map.
         tasks: those of this map alone.
+
+    Raises:
+        DatasetError: a file cannot be written.
     """
     folder = root / "tasks" / f"map_{number}"
-    lines = []
+    rows = []
     for n in range(len(tasks)):
-        (u, v), (x, y) = (ends[n].astype(int).tolist() for ends in (tasks.start, tasks.goal))
-        spots = np.full((tasks.side, tasks.side, 3), 255, dtype=np.uint8)
+        (u, v), (x, y) = (points[n].astype(int).tolist() for points in (tasks.start, tasks.goal))
+        spots = np.full((tasks.size, tasks.size, 3), 255, dtype=np.uint8)
         spots[v, u], spots[y, x] = (0, 0, 255), (255, 0, 0)
         region = np.full_like(spots, 255)
         region[tasks.region[n] > 0] = (0, 255, 0)
         write_image(folder / f"task_{n}.png", spots)
         write_image(folder / f"task_{n}_roi.png", region)
-        lines.append((v, u, y, x, np.hypot(u - x, v - y)))
-    write_csv(root / "tasks" / f"map_{number}.csv", TASK_COLUMNS, lines)
+        rows.append((v, u, y, x, np.hypot(u - x, v - y)))
+    write_csv(root / "tasks" / f"map_{number}.csv", TASK_COLUMNS, rows)
 
 
 def task_row(map_number: int, task: int) -> Row:
-    """The line of a task in ``train.csv`` or ``test.csv``."""
+    """Return the row of a task in ``train.csv`` or ``test.csv``.
+
+    Example:
+        >>> task_row(3, 0)
+        ('map_3.png', 'task_0.png', 'task_0_roi.png')
+    """
     return f"map_{map_number}.png", f"task_{task}.png", f"task_{task}_roi.png"
 
 
@@ -67,24 +79,30 @@ def write_lists(root: Path, rows: Sequence[Row], is_test: NDArray[np.bool_]) -> 
         root: folder of the set.
         rows: one for each task.
         is_test: (N,), true for those that go to ``test.csv``.
+
+    Raises:
+        DatasetError: a file cannot be written.
     """
     for name, wanted in (("train", False), ("test", True)):
-        chosen = [row for row, test in zip(rows, is_test.tolist(), strict=True) if test is wanted]
-        write_csv(root / f"{name}.csv", COLUMNS, chosen)
+        selected = [row for row, test in zip(rows, is_test.tolist(), strict=True) if test is wanted]
+        write_csv(root / f"{name}.csv", COLUMNS, selected)
 
 
 def write_image(path: Path, pixels: NDArray[np.uint8]) -> None:
-    """Write a PNG file, (H, W, 3), red, green, blue, whole or not at all; folders are made.
+    """Write a PNG file whole or not at all; missing folders are made.
+
+    Args:
+        path: of the file.
+        pixels: (H, W, 3), red, green, blue.
 
     Raises:
         DatasetError: it cannot be written.
     """
-    data = cv2.imencode(".png", np.ascontiguousarray(pixels[..., ::-1]))[1].tobytes()
-    _write(path, data)
+    _write(path, cv2.imencode(".png", np.ascontiguousarray(pixels[..., ::-1]))[1].tobytes())
 
 
 def write_csv(path: Path, columns: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
-    """Write a CSV file, whole or not at all.
+    """Write a CSV file whole or not at all; missing folders are made.
 
     Raises:
         DatasetError: it cannot be written.
@@ -93,14 +111,9 @@ def write_csv(path: Path, columns: Iterable[str], rows: Iterable[Iterable[object
     writer = csv.writer(text)
     writer.writerow(columns)
     writer.writerows(rows)
-    _write(path, text.getvalue().encode("utf-8"))
+    _write(path, text.getvalue())
 
 
-def _write(path: Path, data: bytes) -> None:
-    temporary = path.with_suffix(".tmp")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary.write_bytes(data)
-        os.replace(temporary, path)
-    except OSError as error:
-        raise DatasetError(f"cannot write {path}: {error.strerror or error}") from error
+def _write(path: Path, data: bytes | str) -> None:
+    make_folder(path.parent, DatasetError)
+    write_atomically(path, data, DatasetError)

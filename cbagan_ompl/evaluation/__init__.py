@@ -1,1 +1,1 @@
-"""Scores of predicted regions, next to trivial baselines."""
+"""Scores of predicted regions, next to those of trivial baselines."""

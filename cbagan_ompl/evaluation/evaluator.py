@@ -1,4 +1,4 @@
-"""Scoring of predictions on the tasks of a data set."""
+"""Evaluation of predictions on the tasks of a data set."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..datasets.dataset import Tasks
 from ..errors import DatasetError
 from ..sampling.heatmap import REGION_THRESHOLD
-from .bootstrap import interval, resampled_weights
+from .bootstrap import bootstrap_weights, percentile_interval
 from .frechet import frechet_distance
 from .metrics import TaskScores, task_scores
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..inference.predictor import Predictor
 
 _BATCH = 32
-_TIMED_CALLS, _WARM_UP = 100, 10
+_TIMED_CALLS, _WARM_UP_CALLS = 100, 10
 
 #: Features of regions, (N, H, W) -> (N, F).
 Features = Callable[[NDArray[np.bool_]], NDArray[np.float64]]
@@ -35,12 +35,13 @@ class Evaluation:
     Attributes:
         name: of the predictor.
         predicted: (N, S, S), true in the predicted region.
-        tasks: what is known of each task.
+        tasks: counts for each task.
         scores: see :meth:`cbagan_ompl.evaluation.metrics.TaskScores.means`.
-        intervals: 95 % bootstrap intervals of these.
-        frechet: distance to the true regions, by the features that were asked for.
-        model: for a network ``parameters``, ``inference_ms`` (median of single tasks on one CPU
-            thread) and ``batched_ms`` (a task, in batches); empty for others.
+        intervals: 95 % bootstrap intervals of the scores.
+        frechet: Frechet distance to the true regions.
+        model: for a network ``parameters``, ``inference_ms`` (milliseconds for a task on one CPU
+            thread, median) and ``batched_ms`` (milliseconds for a task in batches, mean); empty
+            for other predictions.
     """
 
     name: str
@@ -52,21 +53,21 @@ class Evaluation:
     model: Mapping[str, Any]
 
     def to_dict(self) -> dict[str, Any]:
-        """The figures as JSON has them."""
+        """Return the scores as they are written to JSON."""
         return {
             "scores": dict(self.scores),
-            "intervals": {name: list(ends) for name, ends in self.intervals.items()},
+            "intervals": {name: list(limits) for name, limits in self.intervals.items()},
             "frechet": self.frechet,
             **self.model,
         }
 
 
 class Evaluator:
-    """Scores predictions on the same tasks, with the same resamples and features.
+    """Scores of predictions on the same tasks, with the same resamples and features.
 
     Args:
         tasks: the tasks.
-        features: for the Frechet distance.
+        features: of regions, for the Frechet distance.
         seed: of the resamples.
     """
 
@@ -76,22 +77,27 @@ class Evaluator:
         self._free = tasks.free
         self._features = features
         self._true_features = features(self._truth)
-        self._weights = resampled_weights(tasks.map_of, seed)
+        self._weights = bootstrap_weights(tasks.map_of, seed)
 
     def evaluate(
         self, name: str, predicted: NDArray[np.bool_], model: Mapping[str, Any] | None = None
     ) -> Evaluation:
-        """Score the predicted regions, (N, S, S), of all tasks.
+        """Score the predicted regions of all tasks.
+
+        Args:
+            name: of the predictor.
+            predicted: (N, S, S), true in the region.
+            model: see :class:`Evaluation`.
 
         Raises:
             DatasetError: the regions differ in number or size from the true ones.
         """
         if predicted.shape != self._truth.shape:
-            have, want = (
+            actual, expected = (
                 f"{count} of {width} x {height} pixels"
                 for count, height, width in (predicted.shape, self._truth.shape)
             )
-            raise DatasetError(f"{name}: the predictions are {have}, the labels {want}")
+            raise DatasetError(f"{name}: the predictions are {actual}, the labels {expected}")
         tasks = task_scores(predicted, self._truth, self._free, self.tasks.start, self.tasks.goal)
         scores = tasks.means(np.ones(len(predicted)))
         resampled = tasks.means(self._weights)
@@ -100,17 +106,17 @@ class Evaluator:
             predicted,
             tasks,
             {key: float(value) for key, value in scores.items()},
-            {key: interval(values) for key, values in resampled.items()},
+            {key: percentile_interval(values) for key, values in resampled.items()},
             frechet_distance(self._features(predicted), self._true_features),
             model or {},
         )
 
     def evaluate_model(self, name: str, predictor: Predictor) -> Evaluation:
-        """Score a network at the size of the data set's images, and time it."""
+        """Score a network at the size of the data set's images, and measure its run time."""
         batches = [slice(first, first + _BATCH) for first in range(0, len(self.tasks), _BATCH)]
-        began = perf_counter()
+        started = perf_counter()
         predicted = np.concatenate([self._predict(predictor, batch) for batch in batches])
-        batched = (perf_counter() - began) / len(self.tasks)
+        batched = (perf_counter() - started) / len(self.tasks)
         model = {
             "parameters": predictor.record["parameters"],
             "inference_ms": 1000 * self._time_single(predictor),
@@ -125,10 +131,11 @@ class Evaluator:
         return np.asarray(values >= REGION_THRESHOLD)
 
     def _time_single(self, predictor: Predictor) -> float:
+        """Return the median time of a single task in seconds."""
         seconds = []
-        for i in range(_WARM_UP + _TIMED_CALLS):
-            place = i % len(self.tasks)
-            began = perf_counter()
-            self._predict(predictor, slice(place, place + 1))
-            seconds.append(perf_counter() - began)
-        return median(seconds[_WARM_UP:])
+        for i in range(_WARM_UP_CALLS + _TIMED_CALLS):
+            task = i % len(self.tasks)
+            started = perf_counter()
+            self._predict(predictor, slice(task, task + 1))
+            seconds.append(perf_counter() - started)
+        return median(seconds[_WARM_UP_CALLS:])

@@ -1,4 +1,4 @@
-"""How noisy labels are: the same tasks, labelled twice."""
+"""Noise of RRT labels: the agreement of several labels of the same tasks."""
 
 from __future__ import annotations
 
@@ -15,17 +15,20 @@ from ..errors import ConfigError
 from ..maps.grid_map import GridMap
 from .metrics import confusion
 
+# Labels of each task: one that is predicted, and an odd number that vote.
+_LABELS = 6
 
-def chosen_tasks(tasks: Tasks, count: int, seed: int) -> Tasks:
-    """Some tasks, drawn at random, in their order.
+
+def choose_tasks(tasks: Tasks, count: int, seed: int) -> Tasks:
+    """Choose tasks at random; they keep their order.
 
     Args:
-        tasks: to draw from.
-        count: how many.
+        tasks: to choose from.
+        count: number of tasks.
         seed: the same seed gives the same tasks.
 
     Raises:
-        ConfigError: there are not so many tasks, or the seed is negative.
+        ConfigError: there are fewer tasks, or the seed is negative.
     """
     if not 1 <= count <= len(tasks):
         raise ConfigError(f"tasks must be from 1 to {len(tasks)}, got {count}")
@@ -37,29 +40,31 @@ def chosen_tasks(tasks: Tasks, count: int, seed: int) -> Tasks:
 def label_noise(
     tasks: Tasks, runs: int, range: float, seed: int, jobs: int, progress: bool = True
 ) -> dict[str, Any]:
-    """Label tasks twice with different seeds and compare the labels, for the region class alone.
+    """Label tasks several times with different seeds, and compare the labels.
 
-    Two labels of one task differ because RRT is random. A network cannot know which of them it
-    will be scored with. It may still do better than the one label does as a prediction of the
-    other, because it can leave out what only few runs touch: so the comparison with the mean of
-    many runs is made as well (``majority``: the pixels that at least half of some further labels
-    hold, as a prediction of the first one). That is the ceiling, as far as it can be estimated.
+    Two labels of one task differ because RRT is random, and a network cannot predict which of them
+    it is scored with. So the score of one label as a prediction of another (``two labels``) is near
+    what a network can reach. A network can do better by leaving out pixels that few labels hold:
+    the ``majority``, the pixels that most of five further labels hold, as a prediction of the first
+    label estimates the best score that can be reached.
 
     Args:
-        tasks: what to label.
+        tasks: the tasks.
         runs: of RRT for each label.
         range: longest edge of RRT in pixels.
         seed: the same seed gives the same labels.
-        jobs: processes at a time.
+        jobs: number of processes.
         progress: show a progress bar.
 
     Returns:
-        IoU and Dice, pooled over all pixels and as means over images: of the second label as a
-        prediction of the first (``two labels``), of the ``majority``, and of each against the
-        labels of the data set (``own labels and the first``, ``own labels and the majority``).
+        ``tasks``, ``runs``, ``range`` and ``seed``, and the IoU and Dice, pooled over all pixels
+        and as means over images, of the second label as a prediction of the first
+        (``two labels``), of the ``majority``, and of the first label and the majority as
+        predictions of the labels of the data set (``own labels and the first``,
+        ``own labels and the majority``).
 
     Raises:
-        ConfigError: an option that makes no sense.
+        ConfigError: an argument out of range.
         TaskError: a task whose start or goal is blocked, or which has no path.
     """
     if runs < 1 or not 0 < range < float("inf"):
@@ -70,7 +75,7 @@ def label_noise(
         (free[i], tasks.start[i], tasks.goal[i], runs, range, (seed, i))
         for i in np.arange(len(tasks)).tolist()
     ]
-    labels = np.array(run_all(_labels, arguments, jobs, "tasks", progress))
+    labels = np.array(run_all(_label_task, arguments, jobs, "tasks", progress))
     first, second, others = labels[:, 0], labels[:, 1], labels[:, 1:]
     majority = 2 * others.sum(axis=1) > others.shape[1]
     own = tasks.region.astype(bool)
@@ -79,18 +84,14 @@ def label_noise(
         "runs": runs,
         "range": range,
         "seed": seed,
-        "two labels": _agreement(second, first),
-        "majority": _agreement(majority, first),
-        "own labels and the first": _agreement(first, own),
-        "own labels and the majority": _agreement(majority, own),
+        "two labels": _score_agreement(second, first),
+        "majority": _score_agreement(majority, first),
+        "own labels and the first": _score_agreement(first, own),
+        "own labels and the majority": _score_agreement(majority, own),
     }
 
 
-#: Labels of each task: the one that is predicted, and an odd number that vote.
-_LABELS = 6
-
-
-def _labels(
+def _label_task(
     free: NDArray[np.bool_],
     start: NDArray[np.float32],
     goal: NDArray[np.float32],
@@ -98,7 +99,7 @@ def _labels(
     range: float,
     seed: tuple[int, int],
 ) -> NDArray[np.bool_]:
-    """Labels of one task, (L, S, S)."""
+    """Return several labels of one task, (L, S, S)."""
     from ..datasets.rrt_labels import rrt_region
 
     grid = GridMap(free)
@@ -107,9 +108,9 @@ def _labels(
     return np.array([rrt_region(grid, task, runs, range, ITERATIONS, s) for s in seeds])
 
 
-def _agreement(predicted: NDArray[np.bool_], truth: NDArray[np.bool_]) -> dict[str, float]:
+def _score_agreement(predicted: NDArray[np.bool_], truth: NDArray[np.bool_]) -> dict[str, float]:
     counts = confusion(predicted, truth)
-    pooled = counts.pooled()
+    pooled = counts.pool()
     return {
         "iou": float(pooled.iou()),
         "dice": float(pooled.dice()),

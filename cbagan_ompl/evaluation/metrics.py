@@ -1,50 +1,70 @@
-"""Scores of a predicted region, for the region class alone.
+"""Scores of predicted regions, for the region class alone.
 
-Nearly five sixths of the pixels of the data set lie outside the region, so a score that counts
-them praises an empty prediction. Here an empty prediction scores 0.
+Nearly five sixths of the pixels of the published data set lie outside the regions, so a score that
+counts them is high for an empty prediction. Here an empty prediction scores 0.
+
+With TP the pixels in both regions, FP those in the predicted region alone and FN those in the true
+region alone, the scores are
+
+    IoU = TP / (TP + FP + FN)               (Jaccard index)
+    Dice = 2 TP / (2 TP + FP + FN)          (F1 score)
+    precision = TP / (TP + FP)
+    recall = TP / (TP + FN)
 """
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..maps.connectivity import Connectivity, connects
+
 
 class Confusion(NamedTuple):
-    """Pixel counts, one of each an image, or for a pool of images, there weighted sums as well."""
+    """Pixel counts of each image, or of a pool of images, where they may be weighted sums.
+
+    Attributes:
+        true_positive: TP, pixels in both regions.
+        false_positive: FP, pixels in the predicted region alone.
+        false_negative: FN, pixels in the true region alone.
+
+    Example:
+        >>> counts = Confusion(np.array([2]), np.array([1]), np.array([1]))
+        >>> counts.iou().tolist()
+        [0.5]
+    """
 
     true_positive: NDArray[Any]
     false_positive: NDArray[Any]
     false_negative: NDArray[Any]
 
-    def pooled(self) -> Confusion:
-        """The counts over all images."""
+    def pool(self) -> Confusion:
+        """Return the counts over all images."""
         return Confusion(*(np.asarray(counts.sum()) for counts in self))
 
     def iou(self) -> NDArray[np.float64]:
-        """Intersection over union, TP / (TP + FN + FP)."""
+        """Return the intersection over union, TP / (TP + FP + FN)."""
         tp, fp, fn = self
         return _ratio(tp, tp + fn + fp)
 
     def dice(self) -> NDArray[np.float64]:
-        """Dice score, 2 TP / (2 TP + FN + FP)."""
+        """Return the Dice score, 2 TP / (2 TP + FP + FN)."""
         tp, fp, fn = self
         return _ratio(2 * tp, 2 * tp + fn + fp)
 
     def precision(self) -> NDArray[np.float64]:
-        """Share of the predicted region that is right, TP / (TP + FP)."""
+        """Return the fraction of the predicted region that is right, TP / (TP + FP)."""
         return _ratio(self.true_positive, self.true_positive + self.false_positive)
 
     def recall(self) -> NDArray[np.float64]:
-        """Share of the true region that was found, TP / (TP + FN)."""
+        """Return the fraction of the true region that was found, TP / (TP + FN)."""
         return _ratio(self.true_positive, self.true_positive + self.false_negative)
 
 
 def confusion(predicted: NDArray[np.bool_], truth: NDArray[np.bool_]) -> Confusion:
-    """Count pixels of each kind.
+    """Count the pixels of each kind.
 
     Args:
         predicted: (N, H, W), true in the predicted region.
@@ -58,59 +78,42 @@ def confusion(predicted: NDArray[np.bool_], truth: NDArray[np.bool_]) -> Confusi
     )
 
 
-def connects(
-    region: NDArray[np.bool_], start: tuple[int, int], goal: tuple[int, int], connectivity: int = 8
-) -> bool:
-    """Whether one connected part of the region holds both start and goal.
-
-    Args:
-        region: (H, W), true inside; what is no free space must be false already.
-        start: pixel (column, row). Start and goal count as part of the region.
-        goal: pixel (column, row).
-        connectivity: 8 or 4 neighbours.
-    """
-    mask = region.astype(np.uint8)
-    mask[start[1], start[0]] = mask[goal[1], goal[0]] = 1
-    labels = cv2.connectedComponents(mask, connectivity=connectivity)[1]
-    return bool(labels[start[1], start[0]] == labels[goal[1], goal[0]])
-
-
 class TaskScores(NamedTuple):
-    """What is known of the prediction of each of N tasks, arrays of shape (N,).
+    """Counts for the prediction of each of N tasks, arrays of shape (N,).
 
     Attributes:
         counts: pixels of each kind.
-        joined: whether start and goal are joined inside region and free space, 8-connected.
-        joined_4: the same, 4-connected.
+        connected: whether the region connects start and goal through free space, 8-connected.
+        connected_4: the same, 4-connected.
         area: pixels of the region in free space.
         free: pixels of free space.
     """
 
     counts: Confusion
-    joined: NDArray[np.bool_]
-    joined_4: NDArray[np.bool_]
+    connected: NDArray[np.bool_]
+    connected_4: NDArray[np.bool_]
     area: NDArray[np.int64]
     free: NDArray[np.int64]
 
     def means(self, weights: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-        """All scores, each task weighing as often as it is counted.
+        """Return all scores over the tasks.
 
         Args:
-            weights: (..., N).
+            weights: (..., N), how often each task is counted.
 
         Returns:
-            ``iou``, ``dice``, ``precision`` and ``recall`` over the pixels of all images, the same
-            with suffix ``_per_image`` as means over images, ``connectivity`` and
-            ``connectivity_4``, the share of tasks whose start and goal are joined, and ``area``,
-            the share of free space that the region takes; of shape (...) each.
+            Of shape (...) each: ``iou``, ``dice``, ``precision`` and ``recall`` over the pixels of
+            all images; the same with suffix ``_per_image`` as means over images;
+            ``connectivity`` and ``connectivity_4``, the fractions of tasks whose start and goal are
+            connected; ``area``, the fraction of free space in the region.
         """
         pooled = Confusion(*(weights @ counts for counts in self.counts))
         scores = {}
         for name in ("iou", "dice", "precision", "recall"):
             scores[name] = getattr(pooled, name)()
             scores[f"{name}_per_image"] = _mean(getattr(self.counts, name)(), weights)
-        scores["connectivity"] = _mean(self.joined, weights)
-        scores["connectivity_4"] = _mean(self.joined_4, weights)
+        scores["connectivity"] = _mean(self.connected, weights)
+        scores["connectivity_4"] = _mean(self.connected_4, weights)
         scores["area"] = (weights @ self.area) / (weights @ self.free)
         return scores
 
@@ -122,28 +125,31 @@ def task_scores(
     start: NDArray[np.floating[Any]],
     goal: NDArray[np.floating[Any]],
 ) -> TaskScores:
-    """Compare predicted regions with the true ones.
+    """Compare predicted regions with the true ones, task by task.
 
     Args:
         predicted: (N, H, W), true in the predicted region.
         truth: (N, H, W), true in the true region.
         free: (N, H, W), true in free space.
-        start: (N, 2), pixel coordinates (u, v).
+        start: (N, 2), image coordinates (u, v) in pixels.
         goal: (N, 2), the same.
     """
     inside = predicted & free
-    ends = [
+    endpoints = [
         ((s[0], s[1]), (g[0], g[1]))
         for s, g in zip(start.astype(int).tolist(), goal.astype(int).tolist(), strict=True)
     ]
 
-    def joined(connectivity: int) -> NDArray[np.bool_]:
+    def connected(connectivity: Connectivity) -> NDArray[np.bool_]:
         return np.array(
-            [connects(mask, *pair, connectivity) for mask, pair in zip(inside, ends, strict=True)]
+            [
+                connects(mask, *pair, connectivity=connectivity)
+                for mask, pair in zip(inside, endpoints, strict=True)
+            ]
         )
 
     return TaskScores(
-        confusion(predicted, truth), joined(8), joined(4), _count(inside), _count(free)
+        confusion(predicted, truth), connected(8), connected(4), _count(inside), _count(free)
     )
 
 
@@ -154,7 +160,7 @@ def region_scores(
     start: NDArray[np.floating[Any]],
     goal: NDArray[np.floating[Any]],
 ) -> dict[str, float]:
-    """All scores of predicted regions; arguments as for :func:`task_scores`.
+    """Return all scores of predicted regions; arguments as for :func:`task_scores`.
 
     Returns:
         See :meth:`TaskScores.means`.
@@ -172,5 +178,5 @@ def _mean(values: NDArray[Any], weights: NDArray[np.float64]) -> NDArray[np.floa
 
 
 def _ratio(part: NDArray[Any], whole: NDArray[Any]) -> NDArray[np.float64]:
-    # Nothing predicted scores 0, also where there was nothing to find.
+    # An empty prediction scores 0, also where the true region is empty.
     return np.asarray(part / np.maximum(whole, 1), dtype=np.float64)

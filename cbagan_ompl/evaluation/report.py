@@ -12,29 +12,36 @@ _COLUMNS = {
     "dice": "Dice",
     "precision": "precision",
     "recall": "recall",
-    "connectivity": "joined (8)",
-    "connectivity_4": "joined (4)",
+    "connectivity": "connected (8)",
+    "connectivity_4": "connected (4)",
     "area": "area",
 }
 
 
 def markdown(evaluations: Sequence[Evaluation], frechet_name: str) -> str:
-    """A table with a line for each prediction, 95 % intervals in brackets.
+    """Return a table with a row for each prediction, 95 % intervals in brackets.
 
     Args:
-        evaluations: in the order of the lines.
-        frechet_name: what the column of the Frechet distance is called.
+        evaluations: in the order of the rows.
+        frechet_name: heading of the column of the Frechet distance.
     """
     columns = ["", *_COLUMNS.values(), frechet_name, "parameters", "inference"]
-    return table(columns, map(_line, evaluations)) + "\n"
+    return table(columns, map(_row, evaluations)) + "\n"
 
 
-def _line(one: Evaluation) -> list[str]:
-    scores = [
-        f"{one.scores[key]:.3f} [{one.intervals[key][0]:.3f}, {one.intervals[key][1]:.3f}]"
-        for key in _COLUMNS
+def _row(evaluation: Evaluation) -> list[str]:
+    scores, intervals, network = evaluation.scores, evaluation.intervals, ["", ""]
+    if evaluation.model:
+        network = [
+            f"{evaluation.model['parameters']:,}",
+            f"{evaluation.model['inference_ms']:.1f} ms",
+        ]
+    return [
+        evaluation.name,
+        *(
+            f"{scores[key]:.3f} [{intervals[key][0]:.3f}, {intervals[key][1]:.3f}]"
+            for key in _COLUMNS
+        ),
+        f"{evaluation.frechet:.3g}",
+        *network,
     ]
-    network = ["", ""]
-    if one.model:
-        network = [f"{one.model['parameters']:,}", f"{one.model['inference_ms']:.1f} ms"]
-    return [one.name, *scores, f"{one.frechet:.3g}", *network]

@@ -1,75 +1,87 @@
-"""A picture of a prediction's best, middling and worst cases."""
+"""A figure of the best, median and worst cases of a prediction."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from ..common.figures import BLUE, OBSTACLE, PURPLE, mark_endpoints, write_figure
 from ..datasets.dataset import Tasks
-from ..errors import ConfigError
 from .evaluator import Evaluation
 
-# Colours of Okabe and Ito, which people with any colour vision can tell apart.
-_RIGHT, _TOO_MUCH, _MISSED = "#009E73", "#E69F00", "#CC79A7"
-_START, _GOAL = "#0072B2", "#D55E00"
+# The third is the yellow of Okabe and Ito's palette: orange would be too close to the goal's mark.
+_FOUND, _MISSED, _EXCESS = BLUE, PURPLE, "#F0E442"
+# Half way between obstacle and colour, so that a region on an obstacle shows both.
+_OPACITY_ON_OBSTACLES = 0.5
+
 _CASES = 3
 
 
 def save_sample_grid(evaluation: Evaluation, tasks: Tasks, path: Path) -> None:
-    """Draw three best, three middling and three worst tasks by IoU.
+    """Draw the three best, three median and three worst tasks by IoU, and save the figure.
 
     Args:
         evaluation: of the prediction.
         tasks: that it was scored on.
-        path: of the picture.
+        path: of the figure; its suffix chooses the format.
 
     Raises:
         ConfigError: it cannot be written.
     """
     ious = evaluation.tasks.counts.iou()
-    order = np.argsort(-ious, kind="stable")
-    middle = max(0, len(order) // 2 - _CASES // 2)
-    rows = {
-        "best": order[:_CASES],
-        "middling": order[middle : middle + _CASES],
-        "worst": order[::-1][:_CASES],
-    }
-    figure = Figure(figsize=(8.4, 8.9), layout="constrained")
-    grid = figure.subplots(len(rows), _CASES, squeeze=False)
-    for line, (name, chosen) in zip(grid, rows.items(), strict=True):
-        for axes in line:
+    figure = Figure(figsize=(8.4, 9.1), layout="constrained")
+    cases, handles = _choose_cases(ious), list[Artist]()
+    grid = figure.subplots(len(cases), _CASES, squeeze=False)
+    for row, (name, chosen) in zip(grid, cases.items(), strict=True):
+        for axes in row:
             axes.set(xticks=[], yticks=[])
             axes.spines[:].set_color("0.7")
-        for axes, i in zip(line, chosen, strict=False):
-            axes.set_title(f"{name}: IoU {ious[i]:.2f}", fontsize=9)
-            _draw(axes, evaluation.predicted[i], tasks, int(i))
-    meanings = (("found", _RIGHT), ("too much", _TOO_MUCH), ("missed", _MISSED))
-    handles = [Patch(color=color, label=label) for label, color in meanings]
-    handles += [Patch(color=_START, label="start"), Patch(color=_GOAL, label="goal")]
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False)
-    figure.suptitle(f"{evaluation.name}: predicted against true region", fontsize=11)
-    try:
-        figure.savefig(path, dpi=120)
-    except OSError as error:
-        raise ConfigError(f"cannot write {path}: {error.strerror or error}") from error
+        for axes, i in zip(row, chosen.tolist(), strict=False):
+            axes.set_title(f"{name}: IoU {ious[i]:.2f}", fontsize=10)
+            handles = _draw_case(axes, evaluation.predicted[i], tasks, i)
+    figure.legend(handles=handles, loc="outside lower center", ncols=6, frameon=False)
+    figure.suptitle(f"{evaluation.name}: predicted and true regions", fontsize=12)
+    write_figure(figure, path, dots_per_inch=120)
 
 
-def _draw(axes: Axes, predicted: NDArray[np.bool_], tasks: Tasks, i: int) -> None:
+def _choose_cases(ious: NDArray[np.float64]) -> dict[str, NDArray[np.intp]]:
+    """Return the indices of the best, median and worst tasks."""
+    order = np.argsort(-ious, kind="stable")
+    first = max(0, len(order) // 2 - _CASES // 2)
+    return {
+        "best": order[:_CASES],
+        "median": order[first : first + _CASES],
+        "worst": order[::-1][:_CASES],
+    }
+
+
+def _draw_case(axes: Axes, predicted: NDArray[np.bool_], tasks: Tasks, i: int) -> list[Artist]:
+    """Draw a task with both regions; return the handles of a legend."""
     free, truth = tasks.maps[tasks.map_of[i]].astype(bool), tasks.region[i].astype(bool)
-    image = np.where(free[..., None], np.ones(3), np.full(3, 0.15))
-    for mask, color in (
-        (predicted & truth, _RIGHT),
-        (predicted & ~truth, _TOO_MUCH),
+    image = np.where(free[..., None], np.ones(3), np.array(to_rgb(OBSTACLE)))
+    opacity = np.where(free, 1.0, _OPACITY_ON_OBSTACLES)[..., None]
+    for mask, colour in (
+        (predicted & truth, _FOUND),
+        (predicted & ~truth, _EXCESS),
         (~predicted & truth, _MISSED),
     ):
-        # Where a prediction covers an obstacle, the obstacle shows through.
-        image[mask] = np.array(to_rgb(color)) * np.where(free[mask], 1.0, 0.5)[:, None]
-    axes.imshow(image, extent=(0, tasks.side, tasks.side, 0), interpolation="nearest")
-    for point, color in ((tasks.start[i], _START), (tasks.goal[i], _GOAL)):
-        axes.plot(*point, "o", color=color, markeredgecolor="white", markersize=8)
+        blend = opacity * np.array(to_rgb(colour)) + (1 - opacity) * image
+        image[mask] = blend[mask]
+    axes.imshow(image, extent=(0, tasks.size, tasks.size, 0), interpolation="nearest")
+    meanings = (
+        ("in both", _FOUND),
+        ("predicted only", _EXCESS),
+        ("true only", _MISSED),
+        ("obstacle", OBSTACLE),
+    )
+    return [
+        *(Patch(color=colour, label=label) for label, colour in meanings),
+        *mark_endpoints(axes, tasks.start[i], tasks.goal[i], scale=0.9),
+    ]

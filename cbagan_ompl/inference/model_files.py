@@ -1,4 +1,4 @@
-"""Exported model files: where the bundled one lies, and what is wrong with those that are none.
+"""Exported model files: where the bundled one is, and clear errors for files that are no models.
 
 All checks here come before torch opens a file, because TorchScript archives may carry code.
 """
@@ -13,6 +13,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..common.files import read_bytes, read_text, reason
 from ..errors import ModelError
 
 if TYPE_CHECKING:
@@ -31,13 +32,13 @@ _EXPORT_HINT = "export one with: cbagan-ompl export CHECKPOINT --output MODEL.pt
 
 
 def bundled_model() -> Path:
-    """The default model that comes with the package.
+    """Return the path of the default model, which comes with the package.
 
     Raises:
         ModelError: this installation has none.
     """
     package = Path(__file__).resolve().parent.parent
-    # An installed wheel carries the folder inside the package, a checkout has it beside it.
+    # An installed wheel has the folder inside the package, a checkout beside it.
     for folder in (package / "models", package.parent / "models"):
         if (folder / MANIFEST).is_file():
             return folder / str(read_manifest(folder / MANIFEST)["default"])
@@ -45,14 +46,20 @@ def bundled_model() -> Path:
 
 
 def read_manifest(path: Path) -> dict[str, Any]:
-    """The list of models in a folder: ``{"default": NAME, "files": {NAME: {"sha256": ...}}}``.
+    """Read the list of models in a folder.
+
+    Args:
+        path: of the list.
+
+    Returns:
+        ``{"default": NAME, "files": {NAME: {"sha256": ...}}}``.
 
     Raises:
         ModelError: it cannot be read, or has another form.
     """
     try:
-        manifest = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        manifest = json.loads(read_text(path, ModelError))
+    except ValueError as error:
         raise ModelError(f"{path}: cannot read the list of models ({error})") from error
     if not (
         isinstance(manifest, dict)
@@ -65,12 +72,16 @@ def read_manifest(path: Path) -> dict[str, Any]:
 
 
 def sha256(path: Path) -> str:
-    """SHA-256 of a file in hexadecimal."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    """Return the SHA-256 of a file in hexadecimal.
+
+    Raises:
+        ModelError: the file cannot be read.
+    """
+    return hashlib.sha256(read_bytes(path, ModelError)).hexdigest()
 
 
 def read_record(path: Path) -> dict[str, Any]:
-    """Check that a file is an exported model, and read what it says about itself.
+    """Check that a file is an exported model, and return what it says about itself.
 
     Where a ``manifest.json`` beside the file lists it, the SHA-256 must agree as well.
 
@@ -81,7 +92,7 @@ def read_record(path: Path) -> dict[str, Any]:
     _check_readable(path)
     _check_listed(path)
     if not zipfile.is_zipfile(path):
-        raise ModelError(_not_a_zip(path))
+        raise ModelError(_explain_no_zip(path))
     try:
         with zipfile.ZipFile(path) as archive:
             names = archive.namelist()
@@ -92,7 +103,7 @@ def read_record(path: Path) -> dict[str, Any]:
             f"{path}: the file is damaged ({error}); copy or export it again"
         ) from error
     if text is None:
-        raise ModelError(_no_record(path, names))
+        raise ModelError(_explain_no_record(path, names))
     return _parse_record(path, text)
 
 
@@ -105,7 +116,7 @@ def load_script(path: str | PathLike[str]) -> torch.nn.Module:
     import torch
 
     with warnings.catch_warnings():
-        # TorchScript is deprecated, see export.save_script.
+        # TorchScript is deprecated, see save_script in training/export.
         warnings.simplefilter("ignore", DeprecationWarning)
         module: torch.nn.Module = torch.jit.load(str(path), map_location="cpu")  # type: ignore[no-untyped-call]
     return module
@@ -121,8 +132,7 @@ def _check_readable(path: Path) -> None:
         raise ModelError(f"{path}: no such file; check the path, or {_EXPORT_HINT}") from error
     # A path with a NUL character is a ValueError.
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise ModelError(f"{path}: cannot read the file ({reason})") from error
+        raise ModelError(f"{path}: cannot read the file ({reason(error)})") from error
     if empty:
         raise ModelError(f"{path}: the file is empty; copy it again, or {_EXPORT_HINT}")
 
@@ -135,11 +145,11 @@ def _check_listed(path: Path) -> None:
     if expected is not None and sha256(path) != expected:
         raise ModelError(
             f"{path}: SHA-256 differs from the one in {manifest.name} beside it, so the file is "
-            "damaged or was exchanged; install the package again, or export the model again"
+            "damaged or was replaced; install the package again, or export the model again"
         )
 
 
-def _not_a_zip(path: Path) -> str:
+def _explain_no_zip(path: Path) -> str:
     with path.open("rb") as file:
         head = file.read(1024)
     if head.startswith(b"PK"):
@@ -153,7 +163,7 @@ def _not_a_zip(path: Path) -> str:
     return f"{path}: a text file, not an exported model; {_EXPORT_HINT}"
 
 
-def _no_record(path: Path, names: list[str]) -> str:
+def _explain_no_record(path: Path, names: list[str]) -> str:
     entries = {name.rpartition("/")[2] for name in names}
     if "constants.pkl" in entries:
         return (

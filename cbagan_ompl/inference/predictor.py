@@ -19,13 +19,13 @@ from .model_files import bundled_model, load_script, read_record
 if TYPE_CHECKING:
     import torch
 
-# Free space keeps at least this value, so that a heat map can be drawn from even where the network
-# is certain that there is nothing.
+# Free space keeps at least this value, so that a heat map can be sampled even where the network is
+# certain that no path runs.
 _FLOOR = 1e-4
 
-# Small maps are enlarged to so many times their size at most: more shows the network nothing new,
-# and costs the square of it.
-_MOST_ENLARGED = 2
+# Small maps are enlarged by this factor at most: more shows the network nothing new, and the cost
+# grows with its square.
+_MAX_ENLARGEMENT = 2
 
 
 def load_model(path: str | PathLike[str] | None = None) -> Predictor:
@@ -39,6 +39,10 @@ def load_model(path: str | PathLike[str] | None = None) -> Predictor:
     Raises:
         MissingDependencyError: torch is not installed.
         ModelError: the file is missing, no exported model, damaged, or of a newer version.
+
+    Example:
+        >>> load_model()
+        Predictor('cbagan-worlds', working size 256 pixels)
     """
     require_torch()
     source = bundled_model() if path is None else Path(path)
@@ -59,13 +63,19 @@ class Predictor:
 
     Attributes:
         record: what the model file says about itself: ``working_size``, ``metrics``, ``recipe``...
-        inference_threads: CPU threads for one prediction. More than one rarely pays at the
-            working size, and costs ten times as long where other work has the cores.
+        inference_threads: CPU threads for one prediction. More than one rarely helps at the
+            working size, and takes ten times as long where other work has the cores.
 
     Args:
         module: maps (free, start, goal) to a region probability, see
-            :class:`cbagan_ompl.training.export.RegionModel`.
+            :class:`cbagan_ompl.networks.export_model.RegionModel`.
         record: the record of its file.
+
+    Example:
+        >>> from cbagan_ompl import GridMap
+        >>> heatmap = load_model().predict(GridMap.load("bundled:rooms"), (20, 20), (230, 230))
+        >>> heatmap.values.shape
+        (256, 256)
     """
 
     def __init__(self, module: torch.nn.Module, record: dict[str, Any]) -> None:
@@ -74,31 +84,31 @@ class Predictor:
         self.inference_threads = 1
 
     def warm_up(self) -> None:
-        """Predict for an empty map: the first call takes up to four times as long as the others."""
-        side = int(self.record["working_size"])
-        ends = np.array([[0.5, 0.5], [side - 0.5, side - 0.5]])
-        self.probabilities(np.ones((1, side, side), np.bool_), ends[:1], ends[1:])
+        """Predict for an empty map, since the first call takes up to four times as long."""
+        size = int(self.record["working_size"])
+        endpoints = np.array([[0.5, 0.5], [size - 0.5, size - 0.5]])
+        self.probabilities(np.ones((1, size, size), np.bool_), endpoints[:1], endpoints[1:])
 
     def predict(
         self, grid: GridMap, start: ArrayLike, goal: ArrayLike, repair: bool = True
     ) -> Heatmap:
-        """Predict where good paths run.
+        """Predict where good paths probably run.
 
         Args:
             grid: the map, of any size. For the network its longer side is scaled to the model's
                 ``working_size`` (small maps to twice their size), and the result back again.
             start: (x, y), world.
             goal: (x, y), world.
-            repair: join the parts of the region where it falls apart between start and goal, see
-                :meth:`Heatmap.connected`; without it the heat map is as the network left it.
+            repair: connect the parts of the region where it does not connect start and goal, see
+                :meth:`Heatmap.connected`; without it the heat map is the network's output.
 
         Raises:
             TaskError: see :meth:`GridMap.check_task`.
         """
-        ends = grid.to_pixel(grid.check_task(start, goal))
+        endpoints = grid.to_pixel(grid.check_task(start, goal))
         shape = scaled_shape(grid.shape, int(self.record["working_size"]))
-        scaled_ends = ends * (shape[1] / grid.width, shape[0] / grid.height)
-        values = self.probabilities(scaled_free(grid.free, shape)[None], *scaled_ends[:, None])[0]
+        scaled = endpoints * (shape[1] / grid.width, shape[0] / grid.height)
+        values = self.probabilities(scaled_free(grid.free, shape)[None], *scaled[:, None])[0]
         full = cv2.resize(values, grid.shape[::-1], interpolation=cv2.INTER_LINEAR)
         heatmap = Heatmap(np.clip(full, _FLOOR, 1), grid)
         return heatmap.connected(start, goal) if repair else heatmap
@@ -106,11 +116,11 @@ class Predictor:
     def probabilities(
         self, free: NDArray[np.bool_], start: NDArray[np.floating], goal: NDArray[np.floating]
     ) -> NDArray[np.float32]:
-        """What the network says of maps at the size they have, without scaling or repair.
+        """Return the network's output for maps at the size they have, without scaling or repair.
 
         Args:
             free: (B, H, W), true where free.
-            start: (B, 2), pixel coordinates (u, v).
+            start: (B, 2), pixel coordinates (u, v), u right and v down.
             goal: (B, 2), the same.
 
         Returns:
@@ -120,13 +130,13 @@ class Predictor:
         from torch.jit import optimized_execution  # type: ignore[attr-defined]
 
         cells = torch.from_numpy(free.astype(np.float32))[:, None]
-        ends = (torch.from_numpy(points.astype(np.float32)) for points in (start, goal))
+        endpoints = (torch.from_numpy(points.astype(np.float32)) for points in (start, goal))
         threads = torch.get_num_threads()
         torch.set_num_threads(self.inference_threads)
         try:
             # Without the optimiser, whose first two calls take ten times as long: a plan makes one.
             with torch.inference_mode(), optimized_execution(False):
-                values = self._module(cells, *ends)
+                values = self._module(cells, *endpoints)
         finally:
             torch.set_num_threads(threads)
         result: NDArray[np.float32] = values[:, 0].numpy()
@@ -140,23 +150,27 @@ class Predictor:
 
 
 def scaled_shape(shape: tuple[int, int], longest: int) -> tuple[int, int]:
-    """Rows and columns of a map whose longer side is scaled to ``longest`` pixels.
+    """Return rows and columns of a map scaled to ``longest`` pixels on its longer side.
 
-    It is doubled at most.
+    Small maps are doubled at most.
+
+    Example:
+        >>> scaled_shape((512, 256), 256), scaled_shape((30, 20), 256)
+        ((256, 128), (60, 40))
     """
-    factor = min(longest / max(shape), _MOST_ENLARGED)
+    factor = min(longest / max(shape), _MAX_ENLARGEMENT)
     return max(1, round(factor * shape[0])), max(1, round(factor * shape[1]))
 
 
 def scaled_free(free: NDArray[np.bool_], shape: tuple[int, int]) -> NDArray[np.bool_]:
-    """A free mask enlarged, or scaled down so that a pixel is free when any of its block is.
+    """Return a free mask at another size; a pixel is free when any pixel of its block is.
 
-    Narrow passages survive, thin walls may not. That is the lesser harm: what the network then
-    draws across a wall is cut out by the obstacles of the full map, whereas a passage that it
-    cannot see it never draws.
+    When a map is scaled down, narrow passages survive, thin walls may not. That is the lesser harm:
+    where the predicted region then crosses a wall, the obstacles of the full map cut it, but
+    through a passage that the network cannot see it predicts no region.
 
     Args:
-        free: (H, W).
+        free: (H, W), true where free.
         shape: (h, w).
     """
     if shape == free.shape:

@@ -1,9 +1,9 @@
-"""Random maps of many kinds that planners find hard in different ways.
+"""Generators of random maps, of many kinds that are hard for planners in different ways.
 
-Every family is a function that draws one map: free pixels are true, row 0 is on top, lengths are in
-pixels. The free pixels of a map are all connected (4-connected): pockets that no path reaches are
-filled. All chance is NumPy's: the same seed gives the same map with the same versions of NumPy,
-SciPy and OpenCV.
+A generator is a function ``(rng, width, height)`` that returns one map as a bool array (height,
+width), true where free, row 0 on top; all lengths are in pixels. The free pixels of a map are
+4-connected: pockets that no path reaches are filled. All random numbers come from ``rng``: the same
+seed gives the same map with the same versions of NumPy, SciPy and OpenCV.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ from .obstacles import (
     triangles,
     walls_with_gaps,
 )
-from .shapes import MIN_SIDE, Mask, without_pockets
+from .shapes import MIN_SIZE, Mask, fill_pockets
 from .terrain import blocked_cells, caves, city, curved_walls, race_track
 
 __all__ = [
     "MAP_GENERATORS",
-    "MIN_SIDE",
+    "MIN_SIZE",
     "Mask",
     "bug_trap",
     "check_generators",
+    "fill_pockets",
     "narrow_passage",
-    "without_pockets",
 ]
 
-#: Every family by its name.
+#: Every generator by its name.
 MAP_GENERATORS: dict[str, Callable[[np.random.Generator, int, int], Mask]] = {
     "blocked_cells": blocked_cells,
     "blocks": blocks,
@@ -65,15 +65,18 @@ MAP_GENERATORS: dict[str, Callable[[np.random.Generator, int, int], Mask]] = {
 
 
 def check_generators(names: Sequence[str]) -> None:
-    """Refuse a list of families that is empty or names one that is not there.
+    """Raise if a list of generators is empty or holds an unknown name.
+
+    Args:
+        names: keys of :data:`MAP_GENERATORS`.
 
     Raises:
-        ConfigError: it is; the message lists those that are.
+        ConfigError: it does; the message lists the known names.
     """
     unknown = [name for name in names if name not in MAP_GENERATORS]
     if not names:
-        raise ConfigError(f"no map family is named; there are {', '.join(MAP_GENERATORS)}")
+        raise ConfigError(f"no map generator is given; there are {', '.join(MAP_GENERATORS)}")
     if unknown:
         raise ConfigError(
-            f"unknown map family {', '.join(unknown)!r}; there are {', '.join(MAP_GENERATORS)}"
+            f"unknown map generator {', '.join(unknown)!r}; there are {', '.join(MAP_GENERATORS)}"
         )

@@ -1,4 +1,4 @@
-"""Families of maps whose ground is open: obstacles strewn over it, and barriers across it."""
+"""Map generators of open ground: scattered obstacles, and barriers across the map."""
 
 from __future__ import annotations
 
@@ -6,11 +6,21 @@ from math import cos, pi, sin
 
 import numpy as np
 
-from .shapes import Mask, Point, box, canvas, ellipse, scatter, strewn, triangle, without_pockets
+from .shapes import (
+    Mask,
+    Point,
+    box,
+    canvas,
+    ellipse,
+    fill_pockets,
+    scatter,
+    scatter_clutter,
+    triangle,
+)
 
 
 def walls_with_gaps(rng: np.random.Generator, width: int, height: int) -> Mask:
-    """Walls from border to border with one or two gaps each, and boxes between them."""
+    """Generate walls from border to border, one or two gaps in each, and boxes between them."""
     free, unit = canvas(width, height)
     count = max(2, round(width / (14 * unit)))
     lane = width / (count + 1)
@@ -28,34 +38,35 @@ def walls_with_gaps(rng: np.random.Generator, width: int, height: int) -> Mask:
             centre = (i + rng.uniform(0.4, 0.6)) * lane, rng.uniform(0.05, 0.95) * height
             half = rng.uniform(0.06, 0.2) * lane, rng.uniform(0.06, 0.3) * lane
             free &= ~box(free, centre, half)
-    return without_pockets(free)
+    return fill_pockets(free)
 
 
 def clutter(rng: np.random.Generator, width: int, height: int) -> Mask:
-    """Boxes and ellipses of many sizes, turned at random, on a quarter to a third of the map."""
+    """Generate boxes and ellipses of many sizes and angles on a quarter to a third of the map."""
     free, unit = canvas(width, height)
-    scatter(free, rng, unit, rng.uniform(0.25, 0.34))
-    return without_pockets(free)
+    scatter_clutter(free, rng, unit, rng.uniform(0.25, 0.34))
+    return fill_pockets(free)
 
 
 def narrow_passage(rng: np.random.Generator, width: int, height: int) -> Mask:
-    """A thick wall with one straight passage of 4 to 6 pixels, clutter on both sides of it."""
+    """Generate a thick wall with one straight passage of 4 to 6 pixels, and clutter beside it."""
     free, unit = canvas(width, height)
     gap, thick = int(rng.integers(4, 7)), round(rng.uniform(0.12, 0.2) * width)
     left = round(rng.uniform(0.42, 0.58) * width - thick / 2)
     top = int(rng.integers(height // 5, 4 * height // 5))
-    # The mouths of the passage stay clear.
+    # Both ends of the passage stay clear.
     clear = box(free, (left + thick / 2, top + gap / 2), (thick / 2 + 4 * unit, 2 * unit))
-    scatter(free, rng, unit, rng.uniform(0.14, 0.2), clear)
+    scatter_clutter(free, rng, unit, rng.uniform(0.14, 0.2), clear)
     free[:, left : left + thick] = False
     free[top : top + gap, left : left + thick] = True
-    return without_pockets(free)
+    return fill_pockets(free)
 
 
 def bug_trap(rng: np.random.Generator, width: int, height: int) -> Mask:
-    """The classic trap: a hollow body with one mouth on the left, whose lips reach far inside.
+    """Generate the classic bug trap: a hollow body that is open on the left only.
 
-    From inside the way to the right, along which a sampled tree grows at first, is shut.
+    The opening leads through a channel that reaches far into the body, so that a tree from inside
+    must grow away from a goal on the right before it gets out.
     """
     free, unit = canvas(width, height)
     x, y = (rng.uniform(0.48, 0.52) * side for side in (width, height))
@@ -64,53 +75,56 @@ def bug_trap(rng: np.random.Generator, width: int, height: int) -> Mask:
     lip = rng.uniform(0.75, 0.9) * a
     hollow = ellipse(free, (x, y), (a - thick, b - thick), power=3.0)
     free &= hollow | ~ellipse(free, (x, y), (a, b), power=3.0)
-    # The channel of the mouth: a block across the wall on the left, with the way in cut out of it.
+    # The channel of the mouth: a block across the wall on the left, with a passage cut out of it.
     channel = x - a + lip / 2
     free &= ~box(free, (channel, y), (lip / 2, mouth / 2 + thick))
     free |= box(free, (channel - unit, y), (lip / 2 + 1.5 * unit, mouth / 2))
-    # A way around the body and in front of its mouth stays clear.
+    # A passage around the body and in front of its mouth stays clear.
     clear = ellipse(free, (x, y), (a + 2.5 * unit, b + 2.5 * unit), power=3.0)
     clear |= box(free, (x - a, y), (5 * unit, 3 * unit))
-    scatter(free, rng, 0.8 * unit, (~free).mean() + rng.uniform(0.07, 0.11), clear)
-    return without_pockets(free)
+    scatter_clutter(free, rng, 0.8 * unit, (~free).mean() + rng.uniform(0.07, 0.11), clear)
+    return fill_pockets(free)
 
 
 def blocks(rng: np.random.Generator, width: int, height: int) -> Mask:
-    """Upright boxes, apart or overlapping."""
+    """Generate axis-aligned boxes, which may overlap."""
     free, unit = canvas(width, height)
 
-    def draw(centre: Point) -> Mask:
+    def shape(centre: Point) -> Mask:
         return box(free, centre, (rng.uniform(2, 9) * unit, rng.uniform(2, 9) * unit))
 
-    return strewn(free, rng, rng.uniform(0.1, 0.3), draw)
+    scatter(free, rng, rng.uniform(0.1, 0.3), shape)
+    return fill_pockets(free)
 
 
 def ellipses(rng: np.random.Generator, width: int, height: int) -> Mask:
-    """Ellipses at any angle."""
+    """Generate ellipses at any angle."""
     free, unit = canvas(width, height)
 
-    def draw(centre: Point) -> Mask:
+    def shape(centre: Point) -> Mask:
         half = rng.uniform(2, 9) * unit, rng.uniform(2, 9) * unit
         return ellipse(free, centre, half, rng.uniform(0, pi))
 
-    return strewn(free, rng, rng.uniform(0.1, 0.3), draw)
+    scatter(free, rng, rng.uniform(0.1, 0.3), shape)
+    return fill_pockets(free)
 
 
 def triangles(rng: np.random.Generator, width: int, height: int) -> Mask:
-    """Triangles at any angle."""
+    """Generate triangles at any angle."""
     free, unit = canvas(width, height)
 
-    def draw(centre: Point) -> Mask:
+    def shape(centre: Point) -> Mask:
         return triangle(free, centre, rng.uniform(5, 14) * unit, rng.uniform(0, 2 * pi))
 
-    return strewn(free, rng, rng.uniform(0.08, 0.22), draw)
+    scatter(free, rng, rng.uniform(0.08, 0.22), shape)
+    return fill_pockets(free)
 
 
 def tl_shapes(rng: np.random.Generator, width: int, height: int) -> Mask:
-    """Shapes of the letters T and L, upright or turned by right angles or a little more."""
+    """Generate shapes of the letters T and L, rotated by multiples of about 90 degrees."""
     free, unit = canvas(width, height)
 
-    def draw(centre: Point) -> Mask:
+    def shape(centre: Point) -> Mask:
         angle = rng.integers(4) * pi / 2 + rng.normal(0, 0.1)
         bar, stem, thick = (rng.uniform(*span) * unit for span in ((4, 9), (4, 10), (1.2, 2.5)))
         # The stem hangs from the middle of the bar, or from one end of it.
@@ -120,4 +134,5 @@ def tl_shapes(rng: np.random.Generator, width: int, height: int) -> Mask:
         upper = box(free, centre, (bar, thick), angle)
         return upper | box(free, (x, y), (thick, stem), angle)
 
-    return strewn(free, rng, rng.uniform(0.1, 0.24), draw)
+    scatter(free, rng, rng.uniform(0.1, 0.24), shape)
+    return fill_pockets(free)

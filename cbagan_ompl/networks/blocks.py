@@ -1,4 +1,4 @@
-"""What generators are made of: residual blocks, and the stages that halve and double the size."""
+"""The parts of the generators: residual blocks, and stages that halve and double the size."""
 
 from __future__ import annotations
 
@@ -13,17 +13,24 @@ from .attention import Attention, AttentionBlock
 
 
 def stride_of(patch: int, widths: Sequence[int]) -> int:
-    """What the height and the width of a generator's images are multiples of.
+    """Return the number of pixels that height and width of a generator's images are multiples of.
 
     Args:
-        patch: side of what the generator reads as one place, in pixels.
-        widths: channels after each of its stages on the way down, of which each halves the size.
+        patch: size of the square patches that the generator reads at once, in pixels.
+        widths: channels after each of its stages down, each of which halves the size.
+
+    Example:
+        >>> stride_of(4, (32, 48, 64))
+        32
     """
     return int(patch * 2 ** len(widths))
 
 
 class ResidualBlock(nn.Module):
     """Two 3x3 convolutions with batch norm and attention, added to a shortcut.
+
+    A residual block as in He et al., "Deep residual learning for image recognition", 2016
+    (https://arxiv.org/abs/1512.03385).
 
     Args:
         in_channels: channels of the input.
@@ -59,12 +66,12 @@ class ResidualBlock(nn.Module):
             )
 
     def forward(self, features: Tensor) -> Tensor:
-        """(B, C_in, H, W) -> (B, C_out, H / stride, W / stride)."""
+        """Return (B, out_channels, H / stride, W / stride) for (B, in_channels, H, W)."""
         return torch.relu(self.body(features) + self.shortcut(features))
 
 
 class UpBlock(nn.Module):
-    """Twice the height and width, the skip from the way down added, then a residual block.
+    """Double height and width, add the skip of the stage down, then apply a residual block.
 
     The channels change by a 1x1 convolution before the upsampling, where it costs a quarter.
 
@@ -85,7 +92,12 @@ class UpBlock(nn.Module):
         self.block = ResidualBlock(out_channels, out_channels, 1, attention)
 
     def forward(self, features: Tensor, skip: Tensor) -> Tensor:
-        """(B, C_in, H, W) and (B, C_out, 2 H, 2 W) -> (B, C_out, 2 H, 2 W)."""
+        """Return features of the skip's shape.
+
+        Args:
+            features: (B, in_channels, H, W).
+            skip: (B, out_channels, 2 H, 2 W).
+        """
         upsampled = functional.interpolate(self.project(features), scale_factor=2.0, mode="nearest")
         result: Tensor = self.block(upsampled + skip)
         return result
@@ -95,10 +107,10 @@ class Trunk(nn.Module):
     """The stages after the first one, down and up again: from half the size to half the size.
 
     Args:
-        widths: channels after each of the stages on the way down, the first one included; the way
-            up mirrors them.
-        attention: see :class:`AttentionBlock`. Self-attention, for SAGAN, is left out where the
-            features have half of the side.
+        widths: channels after each of the stages down, the first one included; the stages up
+            mirror them.
+        attention: see :class:`AttentionBlock`. Self-attention, for SAGAN, is left out at half the
+            size of the images, where it would cost most.
     """
 
     def __init__(self, widths: Sequence[int], attention: Attention) -> None:
@@ -111,7 +123,7 @@ class Trunk(nn.Module):
         )
 
     def forward(self, half: Tensor) -> Tensor:
-        """(B, widths[0], h, w) -> the same shape."""
+        """Return features of the same shape (B, widths[0], h, w)."""
         skips = [half]
         for down in self.downs:
             skips.append(down(skips[-1]))

@@ -1,7 +1,8 @@
-"""How maps, points and regions become images for the networks, and back.
+"""Maps, points and regions as images for the networks, and back.
 
 The one place that knows the colours: training and the exported model both call these functions,
-which is why they are TorchScript. Images are (B, 3, H, W), red, green, blue, in [-1, 1]:
+so they stay within what TorchScript can compile. Images are (B, 3, H, W), red, green, blue, in
+[-1, 1]:
 
 * map image: white where free, black where blocked;
 * point image: a blue spot at the start and a red one at the goal, on white;
@@ -18,7 +19,7 @@ SPOT_RADIUS = 2.0
 
 
 def map_image(free: Tensor) -> Tensor:
-    """The map as an image.
+    """Return a map as an image.
 
     Args:
         free: (B, 1, H, W) in [0, 1], 1 where free.
@@ -30,7 +31,7 @@ def map_image(free: Tensor) -> Tensor:
 
 
 def free_space(image: Tensor) -> Tensor:
-    """The free space of a map image: the inverse of the above.
+    """Return the free space of a map image: the inverse of :func:`map_image`.
 
     Args:
         image: (B, 3, H, W) in [-1, 1].
@@ -42,10 +43,11 @@ def free_space(image: Tensor) -> Tensor:
 
 
 def point_image(start: Tensor, goal: Tensor, height: int, width: int) -> Tensor:
-    """Start and goal as an image of two soft spots.
+    """Return start and goal as an image of two soft spots.
 
     Args:
-        start: (B, 2), pixel coordinates (u, v); the centre of the upper left pixel is (0.5, 0.5).
+        start: (B, 2), pixel coordinates (u, v), u right and v down; the centre of the upper left
+            pixel is (0.5, 0.5).
         goal: (B, 2), the same.
         height: H of the image.
         width: W of the image.
@@ -55,12 +57,12 @@ def point_image(start: Tensor, goal: Tensor, height: int, width: int) -> Tensor:
     """
     blue = spot(start, height, width)
     red = spot(goal, height, width)
-    # Both spots leave green dark; red leaves blue dark and the other way about.
+    # Red is dark at the start, blue at the goal, green at both.
     return 1 - 2 * torch.cat((blue, torch.maximum(red, blue), red), 1)
 
 
 def spot(point: Tensor, height: int, width: int, radius: float = SPOT_RADIUS) -> Tensor:
-    """A disc around each point, its edge one pixel soft.
+    """Return a disc around each point, whose edge falls from 1 to 0 over one pixel.
 
     Args:
         point: (B, 2), pixel coordinates (u, v).
@@ -80,7 +82,7 @@ def spot(point: Tensor, height: int, width: int, radius: float = SPOT_RADIUS) ->
 
 
 def region_image(region: Tensor) -> Tensor:
-    """The image that the generator should draw for a region: green on white.
+    """Return a region as the image that the generator learns to produce: green on white.
 
     Args:
         region: (B, 1, H, W) in [0, 1], 1 inside.
@@ -93,7 +95,7 @@ def region_image(region: Tensor) -> Tensor:
 
 
 def region_probability(image: Tensor) -> Tensor:
-    """How far each pixel of a region image is from white towards green: the inverse of the above.
+    """Return how far each pixel is from white to green: the inverse of :func:`region_image`.
 
     Args:
         image: (B, 3, H, W) in [-1, 1].

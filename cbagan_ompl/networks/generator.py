@@ -12,21 +12,23 @@ from .blocks import ResidualBlock, Trunk, UpBlock, stride_of
 
 
 class Generator(nn.Module):
-    """The generator of the paper: stems, four residual stages down, four up, 1x1 to an image.
+    """The generator of the CBAGAN-RRT paper (https://arxiv.org/abs/2305.10442).
 
-    The paper gives the stems (3x3, to 16, 16 and 32 channels, ReLU), the number of stages and the
-    last layer (1x1 to three channels, tanh). Chosen here, because the text is silent:
+    Stems for map, points and noise, residual stages down and up again, 1x1 to an image. The paper
+    gives the stems (3x3, to 16, 16 and 32 channels, ReLU), the number of stages (four down, four
+    up) and the last layer (1x1 to three channels, tanh). The text does not give, and chosen here
+    are:
 
     * the widths: most weights sit in the coarse stages, which see the whole map and cost little
       time; the last stage runs at full size with the 16 channels of a stem;
     * additive skips between stages of equal size, so that walls stay sharp;
     * batch norm in every residual block, and at the end of it the attention block that the paper
       draws for the discriminators; only the last stage has none, where it would cost most;
-    * self-attention, for SAGAN, where the features have a quarter of the side or less.
+    * self-attention, for SAGAN, at a quarter of the size of the images and below.
 
     Args:
-        widths: channels after each of the stages on the way down; the way up mirrors them.
-        attention: see :class:`.attention.AttentionBlock`.
+        widths: channels after each of the stages down; the stages up mirror them.
+        attention: see :class:`~.attention.AttentionBlock`.
         stem: channels of the map stem, of the point stem, and of the last stage.
         noise_stem: channels of the noise stem.
     """
@@ -50,19 +52,19 @@ class Generator(nn.Module):
         self.head = nn.Conv2d(stem, 3, 1)
 
     def forward(self, map_image: Tensor, point_image: Tensor, noise: Tensor) -> Tensor:
-        """The image of the region, values in (-1, 1).
+        """Return the image of the region, values in (-1, 1).
 
         Args:
-            map_image: (B, 3, H, W) in [-1, 1], see :mod:`cbagan_ompl.networks.encoding`; H and W
-                must be multiples of the stride.
+            map_image: (B, 3, H, W) in [-1, 1], see :mod:`~.encoding`; H and W must be multiples of
+                the stride.
             point_image: (B, 3, H, W) in [-1, 1].
             noise: (B, 1, H, W), standard normal in training, zero at inference.
 
         Returns:
             (B, 3, H, W).
         """
-        of_map = torch.relu(self.map_stem(map_image))
-        of_points = torch.relu(self.point_stem(point_image))
-        of_noise = torch.relu(self.noise_stem(noise))
-        half = self.down1(torch.cat((of_map, of_points, of_noise), 1))
-        return torch.tanh(self.head(self.up1(self.trunk(half), of_map + of_points)))
+        map_features = torch.relu(self.map_stem(map_image))
+        point_features = torch.relu(self.point_stem(point_image))
+        noise_features = torch.relu(self.noise_stem(noise))
+        half = self.down1(torch.cat((map_features, point_features, noise_features), 1))
+        return torch.tanh(self.head(self.up1(self.trunk(half), map_features + point_features)))

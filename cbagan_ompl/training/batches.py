@@ -1,4 +1,4 @@
-"""Training batches: tasks of a data set as tensors, turned and mirrored at random."""
+"""Training batches: tasks of a data set as tensors and as images, turned and mirrored at random."""
 
 from __future__ import annotations
 
@@ -14,24 +14,34 @@ from torch.nn import functional
 from ..datasets.dataset import Tasks
 from ..errors import DatasetError
 from ..networks.blocks import stride_of
+from ..networks.discriminator import MIN_PATCHES
+from ..networks.encoding import map_image, point_image, region_image
 from .config import TrainingConfig
 
 
-def check_trainable(side: int, config: TrainingConfig) -> None:
-    """Refuse images that the networks cannot take.
+def check_trainable(size: int, config: TrainingConfig) -> None:
+    """Raise if the networks cannot take images of a size.
 
     Args:
-        side: of the images in pixels.
+        size: height and width of the images in pixels.
         config: the recipe.
 
     Raises:
-        DatasetError: it is no multiple of the networks' strides, at every scale of the recipe.
+        DatasetError: at some scale of the recipe the size is no multiple of the networks' strides,
+            or too small for the discriminators.
     """
-    stride = stride_of(config.patch, config.widths) * lcm(*config.scales)
-    if side % stride:
+    network, scales = config.network, config.scales
+    stride = stride_of(network.patch, network.widths) * lcm(*scales)
+    if size % stride:
         raise DatasetError(
-            f"the networks take images with a side that is a multiple of {stride} pixels; these "
-            f"have {side}"
+            f"the networks take images with a size that is a multiple of {stride} pixels; these "
+            f"have {size}"
+        )
+    # The smallest multiple of the stride whose smallest scale has enough patches.
+    smallest = stride * -(-MIN_PATCHES * network.patch * max(scales) // stride)
+    if size < smallest:
+        raise DatasetError(
+            f"the discriminators take images of at least {smallest} pixels; these have {size}"
         )
 
 
@@ -41,7 +51,7 @@ class Batch:
 
     Attributes:
         free: (B, 1, S, S) float, 1 where free.
-        start: (B, 2) pixel coordinates (u, v).
+        start: (B, 2) pixel coordinates (u, v), u right and v down.
         goal: (B, 2) the same.
         region: (B, 1, S, S) float in [0, 1], 1 in the region.
     """
@@ -50,6 +60,26 @@ class Batch:
     start: Tensor
     goal: Tensor
     region: Tensor
+
+
+@dataclass(frozen=True)
+class Images:
+    """A batch as the networks see it, (B, 3, S, S) in [-1, 1] each."""
+
+    map: Tensor
+    points: Tensor
+    region: Tensor
+
+
+def encode(batch: Batch) -> Images:
+    """Return the images of a batch, see :mod:`cbagan_ompl.networks.encoding`."""
+    height, width = batch.free.shape[-2:]
+    images = (
+        map_image(batch.free),
+        point_image(batch.start, batch.goal, height, width),
+        region_image(batch.region),
+    )
+    return Images(*(image.contiguous(memory_format=torch.channels_last) for image in images))
 
 
 def make_batch(
@@ -61,40 +91,40 @@ def make_batch(
     symmetries: bool = False,
     reversal: bool = False,
 ) -> Batch:
-    """Put tasks together as tensors.
+    """Return some tasks as tensors.
 
     Args:
-        tasks: where from.
-        indices: which, (B,).
-        device: where to.
-        rng: draws the augmentation; needed with either of the following.
+        tasks: all tasks.
+        indices: of the tasks to take, (B,).
+        device: of the tensors.
+        rng: random numbers of the augmentation; needed with either of the following.
         symmetries: turn and mirror each task at random.
         reversal: exchange start and goal of each task at random.
     """
     free, region = tasks.maps[tasks.map_of[indices]], tasks.region[indices]
-    ends = np.stack((tasks.start[indices], tasks.goal[indices]), axis=1)
+    endpoints = np.stack((tasks.start[indices], tasks.goal[indices]), axis=1)
     if rng is not None and symmetries:
         turned = [
-            transformed(code, free[i], region[i], ends[i])
+            apply_symmetry(code, free[i], region[i], endpoints[i])
             for i, code in enumerate(rng.integers(8, size=len(indices)).tolist())
         ]
-        free, region, ends = (np.stack(parts) for parts in zip(*turned, strict=True))
+        free, region, endpoints = (np.stack(parts) for parts in zip(*turned, strict=True))
     if rng is not None and reversal:
         swap = rng.random(len(indices)) < 0.5
-        ends[swap] = ends[swap][:, ::-1]
+        endpoints[swap] = endpoints[swap][:, ::-1]
     return Batch(
         torch.from_numpy(free).to(device).unsqueeze(1).float(),
-        torch.from_numpy(ends[:, 0].copy()).to(device),
-        torch.from_numpy(ends[:, 1].copy()).to(device),
+        torch.from_numpy(endpoints[:, 0].copy()).to(device),
+        torch.from_numpy(endpoints[:, 1].copy()).to(device),
         torch.from_numpy(region).to(device).unsqueeze(1).float(),
     )
 
 
-def scaled_down(batch: Batch, factor: int) -> Batch:
-    """The tasks on smaller maps: a pixel is free, or in the region, when any of its block is.
+def scale_down(batch: Batch, factor: int) -> Batch:
+    """Return the tasks on smaller maps: a pixel is free, or in the region, if any of its block is.
 
     Args:
-        batch: with sides that are multiples of the factor.
+        batch: its images have a size that is a multiple of the factor.
         factor: at least 1.
     """
     if factor == 1:
@@ -107,24 +137,27 @@ def scaled_down(batch: Batch, factor: int) -> Batch:
     )
 
 
-def transformed(
-    code: int, free: NDArray[np.uint8], region: NDArray[np.uint8], ends: NDArray[np.float32]
+def apply_symmetry(
+    code: int, free: NDArray[np.uint8], region: NDArray[np.uint8], endpoints: NDArray[np.float32]
 ) -> tuple[NDArray[np.uint8], NDArray[np.uint8], NDArray[np.float32]]:
-    """One of the 8 symmetries of the square, applied to a task.
+    """Apply one of the 8 symmetries of the square to a task.
 
     Args:
         code: 0 to 7; bit 0 mirrors left and right, bit 1 top and bottom, bit 2 exchanges the axes.
         free: (S, S).
         region: (S, S).
-        ends: (2, 2), start and goal as pixel coordinates (u, v).
+        endpoints: (2, 2), start and goal as pixel coordinates (u, v).
+
+    Returns:
+        ``free``, ``region`` and ``endpoints`` of the turned task.
     """
-    side = free.shape[0]
+    size = free.shape[0]
     if code & 1:
         free, region = free[:, ::-1], region[:, ::-1]
-        ends = np.stack((side - ends[:, 0], ends[:, 1]), axis=1)
+        endpoints = np.stack((size - endpoints[:, 0], endpoints[:, 1]), axis=1)
     if code & 2:
         free, region = free[::-1], region[::-1]
-        ends = np.stack((ends[:, 0], side - ends[:, 1]), axis=1)
+        endpoints = np.stack((endpoints[:, 0], size - endpoints[:, 1]), axis=1)
     if code & 4:
-        free, region, ends = free.T, region.T, ends[:, ::-1]
-    return free, region, ends
+        free, region, endpoints = free.T, region.T, endpoints[:, ::-1]
+    return free, region, endpoints

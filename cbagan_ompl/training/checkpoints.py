@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+import io
 import zipfile
 from os import PathLike
 from pathlib import Path
@@ -10,28 +10,34 @@ from typing import Any
 
 import torch
 
+from ..common.files import write_atomically
 from ..errors import ModelError
+from ..networks.factory import make_generator
 from ..networks.generator import Generator
 from ..networks.patch_generator import PatchGenerator
 from .config import TrainingConfig
-from .gan import make_generator
 
-SCHEMA = 3
+#: Version of the form of a checkpoint; it goes up when the name of an option or a weight changes.
+SCHEMA = 4
 LAST, BEST = "last.pt", "best.pt"
 
 
-def save_atomically(state: dict[str, Any], path: Path) -> None:
-    """Write a checkpoint so that a reader, or an interruption, never meets half a file."""
-    temporary = path.with_suffix(".tmp")
-    torch.save(state, temporary)
-    os.replace(temporary, path)
+def save_checkpoint(state: dict[str, Any], path: Path) -> None:
+    """Write a checkpoint so that a reader, or an interruption, never meets half a file.
+
+    Raises:
+        ModelError: the file cannot be written.
+    """
+    buffer = io.BytesIO()
+    torch.save(state, buffer)
+    write_atomically(path, buffer.getvalue(), ModelError)
 
 
 def load_checkpoint(path: str | PathLike[str]) -> dict[str, Any]:
-    """Read a file that :func:`train` wrote.
+    """Read a file that :func:`cbagan_ompl.training.loop.train` wrote.
 
     Raises:
-        ModelError: the file is missing, or no training checkpoint of this version.
+        ModelError: the file is missing, no training checkpoint, or of another version.
     """
     source = Path(path)
     if not source.is_file():
@@ -46,14 +52,29 @@ def load_checkpoint(path: str | PathLike[str]) -> dict[str, Any]:
         raise ModelError(
             f"{source}: not a training checkpoint, or a damaged one ({type(error).__name__})"
         ) from error
-    if not isinstance(state, dict) or state.get("schema") != SCHEMA:
-        raise ModelError(f"{source}: not a training checkpoint of this version of cbagan-ompl")
-    return state
+    schema = state.get("schema") if isinstance(state, dict) else None
+    if type(schema) is not int:
+        raise ModelError(f"{source}: not a training checkpoint of cbagan-ompl")
+    if schema < SCHEMA:
+        raise ModelError(
+            f"{source}: written by an older version of cbagan-ompl; export it with that version, "
+            "or train again"
+        )
+    if schema > SCHEMA:
+        raise ModelError(
+            f"{source}: written by a newer version of cbagan-ompl; install that version "
+            "(pip install -U cbagan-ompl)"
+        )
+    return dict(state)
 
 
 def best_generator(state: dict[str, Any]) -> Generator | PatchGenerator:
-    """The generator of a checkpoint that its epoch was validated with."""
+    """Return the generator that the epoch of a checkpoint was validated with, in evaluation mode.
+
+    Args:
+        state: from :func:`load_checkpoint`.
+    """
     config = TrainingConfig().updated(state["config"])
-    generator = make_generator(config)
-    generator.load_state_dict(state["networks"]["average" if config.ema_decay else "generator"])
+    generator = make_generator(config.network)
+    generator.load_state_dict(state["gan"]["average" if config.ema_decay else "generator"])
     return generator.eval()

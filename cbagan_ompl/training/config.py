@@ -1,16 +1,31 @@
-"""The training recipe: one frozen record of every choice, with named presets."""
+"""The training recipe: one frozen record of every choice, with named presets.
+
+In configuration files, in ``--set KEY=VALUE``, in checkpoints and on model cards all options have
+flat names: ``widths`` is an option next to ``epochs``, though it belongs to the architecture, which
+has a record of its own (:class:`cbagan_ompl.networks.config.NetworkConfig`). No name occurs twice.
+This module does not import torch.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from ..common.files import read_text
 from ..errors import ConfigError
+from ..networks.config import (
+    AT_LEAST_0,
+    AT_LEAST_1,
+    NetworkConfig,
+    Rule,
+    check_values,
+    convert_values,
+)
 
 SCHEDULES = ("one-cycle", "exponential")
 PRECISIONS = ("float32", "bfloat16")
@@ -18,9 +33,10 @@ PRECISIONS = ("float32", "bfloat16")
 
 @dataclass(frozen=True)
 class TrainingConfig:
-    """Everything that decides what a training run gives, apart from the data.
+    """Everything that decides the result of a training run, apart from the data.
 
     Attributes:
+        network: the architecture of the networks.
         epochs: passes over the training tasks.
         batch_size: tasks in one step.
         generator_lr: highest learning rate of the generator.
@@ -28,26 +44,18 @@ class TrainingConfig:
         point_discriminator_lr: highest learning rate of the point discriminator.
         beta1: decay of the optimisers' first moment.
         beta2: decay of the optimisers' second moment.
-        weight_decay: decoupled decay (AdamW); with 0 the optimiser is plain Adam.
+        weight_decay: decoupled decay (AdamW, https://arxiv.org/abs/1711.05101); with 0 the
+            optimiser is plain Adam.
         clip_norm: gradients of the generator longer than this are shortened to it; 0 turns it off.
             Those of wavefronts are tens of times as long as usual now and then, and Adam takes
             hundreds of steps to recover from one.
-        schedule: ``one-cycle`` (linear warm-up, then a half cosine to 0) or ``exponential``.
-        warmup: share of the steps that the warm-up of ``one-cycle`` takes.
+        schedule: ``one-cycle`` (linear warm-up, then a half cosine to 0, after
+            https://arxiv.org/abs/1708.07120) or ``exponential``.
+        warmup: fraction of the steps that the warm-up of ``one-cycle`` takes.
         decay: factor on the learning rates after each epoch of ``exponential``.
         plateau_patience: epochs without a better validation IoU after which the learning rates
             are lowered (on top of the schedule); 0 turns it off.
         plateau_factor: factor on the learning rates each time.
-        widths: channels of the generator after each of its stages down, which halve the size.
-        stem: channels of its map stem (the paper's has a point stem with as many).
-        patch: side of the patches of pixels that its map stem reads as one place; with 1 it is the
-            paper's generator, which reads pixels.
-        noise_stem: channels of the noise stem of the paper's generator.
-        metrics: of the wavefronts of a generator with patches; 0 for none.
-        channel_attention: use channel attention (in all three networks).
-        spatial_attention: use spatial attention (in all three networks).
-        self_attention: use the self-attention of SAGAN (in all three networks).
-        discriminator_width: channels of each input of a discriminator after its first layer.
         adversarial_every: train the discriminators, and the generator against them, in every
             n-th step; the other steps train the generator on the supervised losses alone.
         adversarial_weight: factor of each adversarial loss (alpha_1 = alpha_2 of the paper).
@@ -58,23 +66,30 @@ class TrainingConfig:
         dice_weight: factor of the Dice loss.
         dice_smooth: smoothing term of the Dice loss.
         positive_weight: factor of the region's part of the binary cross-entropy; above 1 a missed
-            place costs more than one too many.
-        white_obstacles: a generator with patches paints obstacles white, and learns about free
-            space alone.
+            pixel costs more than one too many.
         scales: each batch is scaled down by one of these factors at random, so that the networks
-            learn to see coarse maps as well.
+            learn from coarse maps as well.
         symmetries: turn and mirror each task at random (8 symmetries of the square).
         reversal: exchange start and goal at random. Only for regions that do not depend on which
-            is which: those of the paper's data set grew from one end, and there it costs
+            is which: those of the paper's data set grew from one endpoint, and there it costs
             0.04 of IoU.
-        ema_decay: validate and export a moving average of the generator with this decay a step;
-            0 turns it off.
+        ema_decay: validate and export an exponential moving average of the generator with this
+            decay for each step; 0 turns it off.
         precision: of the networks' arithmetic: ``float32``, or ``bfloat16`` where that is faster
             (weights and losses stay float32).
-        validation_fraction: share of the training tasks that is held back for validation.
+        validation_fraction: fraction of the training tasks that is held out for validation.
         seed: seeds the weights, the split, the order, the augmentation and the noise.
+
+    Raises:
+        ConfigError: a value that makes no sense; the message names the option.
+
+    Example:
+        >>> config = TrainingConfig.preset("synthetic").updated({"epochs": 2, "stem": 8})
+        >>> config.epochs, config.network.stem
+        (2, 8)
     """
 
+    network: NetworkConfig = field(default_factory=NetworkConfig)
     epochs: int = 26
     batch_size: int = 32
     generator_lr: float = 2e-3
@@ -89,15 +104,6 @@ class TrainingConfig:
     decay: float = 0.95
     plateau_patience: int = 0
     plateau_factor: float = 0.1
-    widths: tuple[int, ...] = (32, 64, 96, 128)
-    stem: int = 16
-    patch: int = 1
-    noise_stem: int = 32
-    metrics: int = 0
-    channel_attention: bool = True
-    spatial_attention: bool = True
-    self_attention: bool = False
-    discriminator_width: int = 32
     adversarial_every: int = 6
     adversarial_weight: float = 0.05
     adaptive_alpha: float = 0.0
@@ -106,7 +112,6 @@ class TrainingConfig:
     dice_weight: float = 10.0
     dice_smooth: float = 1.0
     positive_weight: float = 1.0
-    white_obstacles: bool = False
     scales: tuple[int, ...] = (1,)
     symmetries: bool = True
     reversal: bool = False
@@ -116,58 +121,16 @@ class TrainingConfig:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Check the values.
-
-        Raises:
-            ConfigError: a value that makes no sense; the message names the option.
-        """
-        self._check_widths()
         for name, choices in (("schedule", SCHEDULES), ("precision", PRECISIONS)):
             if getattr(self, name) not in choices:
                 raise ConfigError(
                     f"{name} is one of {', '.join(choices)}, got {getattr(self, name)!r}"
                 )
-        # Batch norm needs two tasks where the coarsest stage has one pixel.
-        self._check("batch_size", self.batch_size >= 2, "at least 2")
-        at_least_one = ("epochs", "discriminator_width", "adversarial_every")
-        for name in (*at_least_one, "stem", "noise_stem", "patch"):
-            self._check(name, getattr(self, name) >= 1, "at least 1")
-        for name in ("metrics", "white_obstacles"):
-            self._check(
-                name, self.patch > 1 or not getattr(self, name), "left out where patch is 1"
-            )
-        for name in ("generator_lr", "map_discriminator_lr", "point_discriminator_lr"):
-            self._check(name, getattr(self, name) > 0, "positive")
-        for name in ("decay", "plateau_factor"):
-            self._check(name, 0 < getattr(self, name) <= 1, "above 0 and at most 1")
-        for name in ("beta1", "beta2", "warmup", "ema_decay"):
-            self._check(name, 0 <= getattr(self, name) < 1, "at least 0 and below 1")
-        self._check("validation_fraction", 0 < self.validation_fraction < 1, "between 0 and 1")
-        for field in fields(self):
-            if field.name.endswith(
-                ("_weight", "_decay", "_smooth", "_norm", "_alpha", "_patience", "metrics", "seed")
-            ):
-                self._check(field.name, getattr(self, field.name) >= 0, "at least 0")
-        self._check("seed", self.seed < 2**63, "below 2**63")
-        self._check("scales", len(self.scales) > 0 and min(self.scales) >= 1, "at least 1")
-
-    def _check_widths(self) -> None:
-        if len(self.widths) < 3 or min(self.widths) < 1:
-            raise ConfigError(f"widths are three or more positive numbers, got {self.widths}")
-        # The queries of self-attention have an eighth of the channels.
-        if self.self_attention and min(self.widths[1:]) < 8:
-            raise ConfigError(
-                "with self_attention all widths but the first must be at least 8, "
-                f"got {self.widths}"
-            )
-
-    def _check(self, name: str, holds: bool, rule: str) -> None:
-        if not holds:
-            raise ConfigError(f"{name} must be {rule}, got {getattr(self, name)}")
+        check_values(self, RULES)
 
     @classmethod
     def preset(cls, name: str) -> TrainingConfig:
-        """One of :data:`PRESETS`.
+        """Return one of :data:`PRESETS`.
 
         Raises:
             ConfigError: there is no preset of that name.
@@ -175,16 +138,6 @@ class TrainingConfig:
         if name not in PRESETS:
             raise ConfigError(f"unknown preset {name!r}; choose one of {', '.join(PRESETS)}")
         return PRESETS[name]
-
-    def with_network(self, name: str) -> TrainingConfig:
-        """The same recipe for one of :data:`NETWORKS`.
-
-        Raises:
-            ConfigError: there is no network of that name.
-        """
-        if name not in NETWORKS:
-            raise ConfigError(f"unknown network {name!r}; choose one of {', '.join(NETWORKS)}")
-        return self.updated(NETWORKS[name])
 
     @classmethod
     def from_file(
@@ -196,89 +149,122 @@ class TrainingConfig:
             ConfigError: the file is missing, cannot be parsed, holds an unknown option, or a value
                 of the wrong type or out of range.
         """
-        try:
-            values = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-        except OSError as error:
-            raise ConfigError(f"{path}: cannot read the file ({error.strerror})") from error
-        except (yaml.YAMLError, UnicodeDecodeError) as error:
-            raise ConfigError(f"{path}: neither JSON nor YAML ({error})") from error
+        values = _parse_yaml(read_text(Path(path), ConfigError), str(path))
         if not isinstance(values, dict):
             raise ConfigError(f"{path}: a configuration holds lines such as 'epochs: 20'")
         return (base or cls()).updated(values)
 
-    def updated(self, values: Mapping[str, Any]) -> TrainingConfig:
-        """A copy with some options changed.
+    def with_network(self, name: str) -> TrainingConfig:
+        """Return the same recipe for one of :data:`cbagan_ompl.networks.config.NETWORKS`.
+
+        Raises:
+            ConfigError: there is no network of that name.
+        """
+        return replace(self, network=self.network.variant(name))
+
+    def with_assignments(self, assignments: Sequence[str]) -> TrainingConfig:
+        """Return a copy with the options of some texts ``KEY=VALUE``, as YAML reads the values.
+
+        Raises:
+            ConfigError: a text without ``=``, an unknown option, or a value that cannot be parsed,
+                is of the wrong type or out of range.
+
+        Example:
+            >>> TrainingConfig().with_assignments(["epochs=3", "widths=[8, 8, 16]"]).epochs
+            3
+        """
+        values: dict[Any, Any] = {}
+        for assignment in assignments:
+            name, equals, text = assignment.partition("=")
+            if not equals:
+                raise ConfigError(f"--set takes KEY=VALUE, got {assignment!r}")
+            values[name] = _parse_yaml(text, f"--set {assignment}")
+        return self.updated(values)
+
+    def updated(self, values: Mapping[Any, Any]) -> TrainingConfig:
+        """Return a copy with some options changed.
+
+        Args:
+            values: by the flat name of the option, the architecture's as well.
 
         Raises:
             ConfigError: an unknown option, or a value of the wrong type or out of range.
         """
-        known = asdict(self)
+        known = self.to_dict()
         for name in values:
             if name not in known:
                 raise ConfigError(f"unknown option {name!r}; known are {', '.join(known)}")
-        return replace(
-            self, **{name: _as_type_of(known[name], name, value) for name, value in values.items()}
-        )
+        own = {option.name: getattr(self, option.name) for option in fields(self)}
+        network = {name: value for name, value in values.items() if name not in own}
+        rest = {name: value for name, value in values.items() if name in own}
+        return replace(self, network=self.network.updated(network), **convert_values(own, rest))
 
     def to_dict(self) -> dict[str, Any]:
-        """The options as JSON has them."""
+        """Return all options by their flat names, the architecture's first, with JSON's types."""
+        values = asdict(self)
+        values = values.pop("network") | values
         return {
             name: list(value) if isinstance(value, tuple) else value
-            for name, value in asdict(self).items()
+            for name, value in values.items()
         }
 
 
-def _as_type_of(default: Any, name: str, value: Any) -> Any:
-    """The value in the type of the default; YAML reads 1e-4 as text, and 1 where 1.0 was meant."""
-    if isinstance(default, tuple):
-        if isinstance(value, list | tuple) and all(type(item) is int for item in value):
-            return tuple(value)
-    elif isinstance(default, float):
-        try:
-            if not isinstance(value, bool):
-                return float(value)
-        except (TypeError, ValueError):
-            pass
-    elif type(value) is type(default):
-        return value
-    kind = "list of integers" if isinstance(default, tuple) else type(default).__name__
-    raise ConfigError(f"{name} must be a value of type {kind}, got {value!r}")
+def _parse_yaml(text: str, source: str) -> Any:
+    try:
+        return yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise ConfigError(f"{source}: neither JSON nor YAML ({error})") from error
 
 
-#: The networks that the paper compares: CBAGAN, its ablations with spatial attention, channel
-#: attention or neither, and SAGAN, with widths that give its generator the paper's 1.24 million
-#: parameters. The paper gives CBAGAN 0.88 million and no widths; the ones here give its generator,
-#: which is all that a planner needs, 0.81 million, and the ablations a little less.
-NETWORKS: dict[str, dict[str, Any]] = {
-    "cbagan": {},
-    "sa": {"channel_attention": False},
-    "ca": {"spatial_attention": False},
-    "none": {"channel_attention": False, "spatial_attention": False},
-    "sagan": {
-        "channel_attention": False,
-        "spatial_attention": False,
-        "self_attention": True,
-        "widths": (36, 84, 112, 160),
-    },
+_POSITIVE = Rule(lambda value: value > 0, "positive")
+_FACTOR = Rule(lambda value: 0 < value <= 1, "above 0 and at most 1")
+_BELOW_1 = Rule(lambda value: 0 <= value < 1, "at least 0 and below 1")
+
+#: The rule of each option that is a number, and of ``scales``.
+RULES = {
+    "epochs": AT_LEAST_1,
+    # Batch norm needs two tasks where the coarsest stage has one pixel.
+    "batch_size": Rule(lambda value: value >= 2, "at least 2"),
+    "generator_lr": _POSITIVE,
+    "map_discriminator_lr": _POSITIVE,
+    "point_discriminator_lr": _POSITIVE,
+    "beta1": _BELOW_1,
+    "beta2": _BELOW_1,
+    "weight_decay": AT_LEAST_0,
+    "clip_norm": AT_LEAST_0,
+    "warmup": _BELOW_1,
+    "decay": _FACTOR,
+    "plateau_patience": AT_LEAST_0,
+    "plateau_factor": _FACTOR,
+    "adversarial_every": AT_LEAST_1,
+    "adversarial_weight": AT_LEAST_0,
+    "adaptive_alpha": AT_LEAST_0,
+    "pixel_weight": AT_LEAST_0,
+    "bce_weight": AT_LEAST_0,
+    "dice_weight": AT_LEAST_0,
+    "dice_smooth": AT_LEAST_0,
+    "positive_weight": AT_LEAST_0,
+    "scales": Rule(lambda value: len(value) > 0 and min(value) >= 1, "at least 1"),
+    "ema_decay": _BELOW_1,
+    "validation_fraction": Rule(lambda value: 0 < value < 1, "between 0 and 1"),
+    # The bounds of torch's random numbers.
+    "seed": Rule(lambda value: 0 <= value < 2**63, "at least 0 and below 2**63"),
 }
 
-#: ``worlds`` is what the bundled model was trained with: for images of 256 pixels, drawn without
-#: end. ``best`` is the best one for the paper's data. ``paper`` has the values of the paper's
-#: tables. Where these and its text differ (50 epochs, momentum 0.9), the tables are followed;
-#: ``alpha_1 = alpha_2 = 0.5`` is the text's, the table's 1 being for another loss, as are its
-#: factors of an IoU loss and of a plain generator loss. The numbers that it leaves out (decay,
-#: plateau) are PyTorch's defaults or this project's.
+#: ``synthetic`` is what the bundled model was trained with: for images of 256 pixels, with new maps
+#: in every epoch. ``best`` is the best one for the paper's data. ``paper`` has the values of the
+#: tables of the CBAGAN-RRT paper. Where these and its text differ (50 epochs, momentum 0.9), the
+#: tables are followed; ``alpha_1 = alpha_2 = 0.5`` is the text's, the table's 1 being for another
+#: loss, as are its factors of an IoU loss and of a plain generator loss. The numbers that it leaves
+#: out (decay, plateau) are PyTorch's defaults or this project's.
 PRESETS: dict[str, TrainingConfig] = {
     "best": TrainingConfig(),
-    "worlds": TrainingConfig(
+    "synthetic": TrainingConfig(
+        network=NetworkConfig(widths=(32, 48, 64), patch=4, cost_maps=2, white_obstacles=True),
         epochs=40,
         batch_size=16,
         warmup=0.05,
         clip_norm=2.0,
-        widths=(32, 48, 64),
-        patch=4,
-        metrics=2,
-        white_obstacles=True,
         adversarial_every=8,
         pixel_weight=4.0,
         dice_weight=2.0,

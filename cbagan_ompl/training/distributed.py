@@ -1,7 +1,7 @@
-"""Training in several processes at once, as ``torchrun`` starts them.
+"""Training in several processes at once, as ``torchrun`` starts them, and their devices.
 
-Every process draws the same batches and keeps its share of each. Batch norm takes its mean and
-variance over all shares, so that the gradients are those of one process with the whole batch.
+Every process makes the same batches and keeps its shard of each. Batch norm takes its mean and
+variance over all shards, so that the gradients are those of one process with the whole batch.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ from typing import Any, TypeVar
 
 import torch
 from torch import Tensor, distributed, nn
+
+from ..errors import ConfigError
 
 T = TypeVar("T")
 
@@ -31,16 +33,16 @@ class ProcessGroup:
     size: int = 1
 
     @property
-    def leads(self) -> bool:
+    def is_leader(self) -> bool:
         """Whether this process is the one that validates and writes files."""
         return self.rank == 0
 
-    def share(self, batch: Tensor) -> Tensor:
-        """This process's share of a batch, (B, ...) -> (B / size, ...)."""
+    def shard(self, batch: Tensor) -> Tensor:
+        """Return this process's shard of a batch, (B / size, ...) of (B, ...)."""
         return batch[self.rank :: self.size]
 
     def means(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Means over the processes."""
+        """Return the mean of each value over the processes."""
         if self.size == 1:
             return dict(values)
         mean = torch.tensor(list(values.values()), dtype=torch.float64)
@@ -50,7 +52,7 @@ class ProcessGroup:
         return dict(zip(values, (mean / self.size).tolist(), strict=True))
 
     def from_leader(self, value: T | None) -> T:
-        """What the leading process gives here; the others give nothing."""
+        """Return the value of the leading process; the others pass None."""
         values = [value]
         if self.size > 1:
             distributed.broadcast_object_list(values)
@@ -58,17 +60,40 @@ class ProcessGroup:
         return values[0]
 
 
-def leads() -> bool:
-    """Whether this process is the first or the only one, asked before they know each other."""
+def pick_device(name: str) -> torch.device:
+    """Return the device of a name; ``auto`` is a GPU if there is one.
+
+    Of the processes that ``torchrun`` starts on a machine each gets its own GPU, unless the name
+    has a number. The GPU becomes the current one, through which the processes communicate.
+
+    Raises:
+        ConfigError: no such device.
+    """
+    if name == "auto":
+        name = "cuda" if torch.cuda.is_available() else "cpu"
+    try:
+        device = torch.device(name)
+        if device.type == "cuda" and device.index is None:
+            device = torch.device("cuda", int(os.environ.get("LOCAL_RANK", "0")))
+        torch.empty(1, device=device)
+        if device.type == "cuda":
+            torch.cuda.set_device(device)
+    except (RuntimeError, AssertionError) as error:
+        raise ConfigError(f"cannot use device {name!r}: {error}") from error
+    return device
+
+
+def is_leading_process() -> bool:
+    """Return whether this process is the first or the only one; it needs no process group."""
     return os.environ.get("RANK", "0") == "0"
 
 
 @contextmanager
 def process_group(device: torch.device) -> Iterator[ProcessGroup]:
-    """The processes that ``torchrun`` started, or this process alone.
+    """Yield the group of the processes that ``torchrun`` started, or of this process alone.
 
     Args:
-        device: where the networks are; decides how the processes talk.
+        device: where the networks are; decides how the processes communicate.
     """
     if int(os.environ.get("WORLD_SIZE", "1")) == 1:
         yield ProcessGroup()
@@ -76,19 +101,19 @@ def process_group(device: torch.device) -> Iterator[ProcessGroup]:
     distributed.init_process_group("nccl" if device.type == "cuda" else "gloo")
     try:
         yield ProcessGroup(distributed.get_rank(), distributed.get_world_size())
-        distributed.barrier()  # none leaves while another one still talks to it
+        distributed.barrier()  # none leaves while another one still communicates
     finally:
         distributed.destroy_process_group()
 
 
 class GlobalBatchNorm(nn.BatchNorm2d):
-    """Batch norm over the shares of all processes; each must have the same number of values.
+    """Batch norm over the shards of all processes; each must have the same number of values.
 
     PyTorch's own (``SyncBatchNorm``) has no CPU version.
     """
 
     def forward(self, features: Tensor) -> Tensor:
-        """Features of the same shape (B, C, H, W), and of the same type."""
+        """Return features of the same shape (B, C, H, W), and of the same type."""
         if not self.training:
             return super().forward(features)
         kind = features.dtype
@@ -112,7 +137,7 @@ class GlobalBatchNorm(nn.BatchNorm2d):
 
 
 def _mean(features: Tensor) -> Tensor:
-    """Mean of each channel over all shares, with gradients; (B, C, H, W) -> (C,)."""
+    """Return the mean (C,) of each channel of (B, C, H, W) over all shards, with gradients."""
     total: Tensor = _Sum.apply(features.mean((0, 2, 3)))  # type: ignore[no-untyped-call]
     return total / distributed.get_world_size()
 
@@ -122,25 +147,25 @@ class _Sum(torch.autograd.Function):
 
     @staticmethod
     def forward(context: Any, values: Tensor) -> Tensor:
-        return _Sum._over_processes(values)
+        return _Sum._sum_over_processes(values)
 
     @staticmethod
     def backward(context: Any, gradients: Tensor) -> Tensor:
-        return _Sum._over_processes(gradients)
+        return _Sum._sum_over_processes(gradients)
 
     @staticmethod
-    def _over_processes(values: Tensor) -> Tensor:
+    def _sum_over_processes(values: Tensor) -> Tensor:
         total = values.clone()
         distributed.all_reduce(total)
         return total
 
 
-def share_batch_norm(network: nn.Module) -> None:
-    """Exchange every batch norm inside a network for one over all processes."""
+def synchronize_batch_norm(network: nn.Module) -> None:
+    """Replace every batch norm inside a network by one over all processes."""
     for name, child in network.named_children():
         if isinstance(child, nn.BatchNorm2d):
-            shared = GlobalBatchNorm(child.num_features, child.eps)
-            shared.load_state_dict(child.state_dict())
-            setattr(network, name, shared)
+            synchronized = GlobalBatchNorm(child.num_features, child.eps)
+            synchronized.load_state_dict(child.state_dict())
+            setattr(network, name, synchronized)
         else:
-            share_batch_norm(child)
+            synchronize_batch_norm(child)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import io
 import json
 import warnings
 from os import PathLike
@@ -12,6 +13,7 @@ from typing import Any
 import torch
 from torch import nn
 
+from ..common.files import make_folder, write_atomically
 from ..errors import ModelError
 from ..inference.model_files import MANIFEST, RECORD_NAME, RECORD_SCHEMA, read_manifest, sha256
 from ..networks.export_model import RegionModel
@@ -36,8 +38,8 @@ def export(
     Args:
         checkpoint: a file that :func:`cbagan_ompl.training.loop.train` wrote.
         path: the file to write; its suffix is ``.pt``.
-        note: what the checkpoint cannot know, for the record and the card: where the data come
-            from, under which licence data and model are.
+        note: what the checkpoint cannot tell, for the record and the card: the origin of the data,
+            and the licences of data and model.
 
     Returns:
         The record, as the file carries it.
@@ -52,22 +54,22 @@ def export(
     state = load_checkpoint(checkpoint)
     generator = best_generator(state)
     record = make_record(target.stem, state, generator, note)
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.touch()
-    except OSError as error:
-        raise ModelError(f"cannot write {target}: {error.strerror or error}") from error
+    make_folder(target.parent, ModelError)
     model = RegionModel(generator).eval()
     # Convolutions in this layout take four fifths of the time on a CPU.
     model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     save_script(model, target, record)
-    target.with_suffix(".md").write_text(model_card(record), encoding="utf-8")
+    write_atomically(target.with_suffix(".md"), model_card(record), ModelError)
     _update_manifest(target)
     return record
 
 
 def save_script(model: nn.Module, path: Path, record: dict[str, Any]) -> None:
-    """Compile, freeze and save a module in evaluation mode, with its record inside."""
+    """Compile, freeze and save a module in evaluation mode, with its record inside.
+
+    Raises:
+        ModelError: the file cannot be written.
+    """
     with warnings.catch_warnings():
         # TorchScript is deprecated in favour of torch.export, but it is the form that this
         # package's models have, and torch goes on reading and writing it.
@@ -75,13 +77,15 @@ def save_script(model: nn.Module, path: Path, record: dict[str, Any]) -> None:
         # No optimize_for_inference: what it writes cannot be loaded again.
         frozen = torch.jit.freeze(torch.jit.script(model))
         extra = {RECORD_NAME: json.dumps(record, indent=1)}
-        torch.jit.save(frozen, str(path), _extra_files=extra)
+        buffer = io.BytesIO()
+        torch.jit.save(frozen, buffer, _extra_files=extra)
+    write_atomically(path, buffer.getvalue(), ModelError)
 
 
 def make_record(
     name: str, state: dict[str, Any], generator: nn.Module, note: str = ""
 ) -> dict[str, Any]:
-    """What a model file says about itself.
+    """Return what a model file says about itself.
 
     Args:
         name: of the model.
@@ -113,7 +117,7 @@ def make_record(
 
 
 def model_card(record: dict[str, Any]) -> str:
-    """The record as Markdown, for people."""
+    """Return the record as Markdown, for people."""
     dataset, metrics = record["dataset"], record["metrics"]
     split = "test" if metrics["test"] else "validation"
     rows = {
@@ -129,7 +133,7 @@ def model_card(record: dict[str, Any]) -> str:
     return f"""# {record["name"]}
 
 Predicts, for a 2-D occupancy map with a start and a goal, the region that good paths probably run
-through: the generator of {_network(record["recipe"])}, trained against a map and a
+through: the generator of {_describe_network(record["recipe"])}, trained against a map and a
 point discriminator, exported as TorchScript on {record["date"]} with torch {record["torch"]}.
 
 - Input: {record["inputs"]}
@@ -140,14 +144,14 @@ point discriminator, exported as TorchScript on {record["date"]} with torch {rec
 
 ## Data
 
-{_data(dataset)}
+{_describe_data(dataset)}
 
 {record["note"] or "Licence and origin of the data: not stated."}
 
 ## Scores
 
-Of the region class alone, over all pixels of the {split} tasks; connectivity is the share of tasks
-whose start and goal one 8-connected part of the region in free space joins.
+Of the region class alone, over all pixels of the {split} tasks; connectivity is the fraction of
+tasks whose start and goal one 8-connected part of the region in free space connects.
 
 | predictor | {" | ".join(columns)} |
 |---|{"---|" * len(columns)}
@@ -156,8 +160,8 @@ whose start and goal one 8-connected part of the region in free space joins.
 ## Limits
 
 The scores hold for maps like those of the training set. On other maps the region is a guess that
-may miss the way, so samplers keep a share of uniform draws, and a planner's guarantees rest on
-that share. The region says nothing of a robot's shape or dynamics.
+may miss the path, so samplers keep a fraction of uniform samples, and a planner's guarantees rest
+on that fraction. The region says nothing of a robot's shape or dynamics.
 
 ## Recipe
 
@@ -167,30 +171,28 @@ Epoch {record["epoch"]} of:
 """
 
 
-def _data(dataset: dict[str, Any]) -> str:
-    """What a model was trained on."""
+def _describe_data(dataset: dict[str, Any]) -> str:
     side = dataset["side"]
-    if "worlds" not in dataset:
+    if "synthetic" not in dataset:
         return (
             f"`{dataset['name']}`: {dataset['maps']} maps of {side} x {side} pixels,\n"
             f"{dataset['train_tasks']} tasks for training and validation, "
             f"{dataset['test_tasks']} for testing."
         )
-    worlds = dataset["worlds"]
+    settings = dataset["synthetic"]
     return (
-        f"Drawn while it was trained (`cbagan-ompl train --worlds`, seed {worlds['seed']}): "
-        f"{dataset['maps']} new maps of {side} x {side}\n"
-        f"pixels in each epoch with {dataset['train_tasks']} tasks, "
-        f"{worlds['hard_share']:.0%} of them hard; {dataset['test_tasks']} tasks on other maps\n"
-        "for testing. The label of a pixel falls with the detour that a path through it takes, to "
-        "0.5 at\n"
-        f"{worlds['label']['epsilon']:.0%} and {worlds['label']['slack']:g} pixel. Families: "
-        f"{', '.join(worlds['families'])}."
+        f"Synthetic maps, generated during the training (`cbagan-ompl train --synthetic`, seed "
+        f"{settings['seed']}):\n"
+        f"{dataset['maps']} new maps of {side} x {side} pixels in each epoch with "
+        f"{dataset['train_tasks']} tasks, {settings['hard_fraction']:.0%} of them\n"
+        f"hard; {dataset['test_tasks']} tasks on other maps for testing. The label of a pixel "
+        "falls with the detour\nthat a path through it takes, to 0.5 at "
+        f"{settings['label']['epsilon']:.0%} and {settings['label']['slack']:g} pixel. "
+        f"Generators: {', '.join(settings['generators'])}."
     )
 
 
-def _network(recipe: dict[str, Any]) -> str:
-    """What the network of a recipe is called."""
+def _describe_network(recipe: dict[str, Any]) -> str:
     kinds = [name for name in ("channel", "spatial", "self") if recipe.get(f"{name}_attention")]
     if kinds == ["self"]:
         return "a GAN with self-attention (SAGAN)"
@@ -205,4 +207,4 @@ def _update_manifest(model: Path) -> None:
     if path.exists():
         manifest = read_manifest(path)
     manifest["files"][model.name] = {"sha256": sha256(model)}
-    path.write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")
+    write_atomically(path, json.dumps(manifest, indent=2) + "\n", ModelError)

@@ -1,10 +1,8 @@
-"""The three networks with their optimisers, and the images that they see."""
+"""The three networks of the GAN with their optimisers, and the average of the generator."""
 
 from __future__ import annotations
 
 import copy
-import os
-from dataclasses import dataclass
 from typing import Any
 
 import torch
@@ -12,25 +10,30 @@ from torch import Tensor, nn
 from torch.nn.parallel import DistributedDataParallel
 
 from ..errors import ConfigError
-from ..networks.attention import Attention
-from ..networks.discriminator import Discriminator
-from ..networks.encoding import map_image, point_image, region_image
-from ..networks.generator import Generator
-from ..networks.patch_generator import PatchGenerator
-from .batches import Batch
+from ..networks.factory import make_discriminator, make_generator
 from .config import TrainingConfig
-from .distributed import ProcessGroup, share_batch_norm
+from .distributed import ProcessGroup, synchronize_batch_norm
 
 
-class Networks:
-    """The three networks, their optimisers, and the moving average of the generator.
+class Gan:
+    """The generator, its exponential moving average, and two discriminators, with optimisers.
 
-    Each optimiser owns the weights of one network and of no other.
+    Each optimiser (AdamW; Loshchilov and Hutter, "Decoupled weight decay regularization", 2019,
+    https://arxiv.org/abs/1711.05101) owns the weights of one network and of no other.
+
+    Attributes:
+        group: the processes that train together.
+        generator: a generator of :mod:`cbagan_ompl.networks`.
+        map_discriminator: sees the map image.
+        point_discriminator: sees the point image.
+        average: the moving average of the generator.
+        learning_rates: the highest one of each trained network.
+        optimizers: of each trained network.
 
     Args:
         config: the recipe; ``config.seed`` decides the initial weights.
-        device: where the weights live.
-        group: the processes that share each batch.
+        device: where the weights are.
+        group: the processes that divide each batch among them.
     """
 
     def __init__(
@@ -38,50 +41,46 @@ class Networks:
     ) -> None:
         torch.manual_seed(config.seed)
         self.group = group or ProcessGroup()
-        self.generator = make_generator(config)
-        attention = attention_of(config)
-        self.map_discriminator = Discriminator(config.discriminator_width, attention, config.patch)
-        self.point_discriminator = Discriminator(
-            config.discriminator_width, attention, config.patch
-        )
+        self.generator = make_generator(config.network)
+        self.map_discriminator = make_discriminator(config.network)
+        self.point_discriminator = make_discriminator(config.network)
         self.average = copy.deepcopy(self.generator).requires_grad_(False).eval()
-        self.rates = {
+        self.learning_rates = {
             "generator": config.generator_lr,
             "map_discriminator": config.map_discriminator_lr,
             "point_discriminator": config.point_discriminator_lr,
         }
         self.optimizers: dict[str, torch.optim.Optimizer] = {}
-        self._taught: dict[str, nn.Module] = {}
-        for name, rate in self.rates.items():
+        self._trained: dict[str, nn.Module] = {}
+        for name, learning_rate in self.learning_rates.items():
             network = getattr(self, name)
             if self.group.size > 1:
-                share_batch_norm(network)
-            _place(network, device)
-            self._taught[name] = network
+                synchronize_batch_norm(network)
+            _move(network, device)
+            self._trained[name] = network
             if self.group.size > 1:
-                self._taught[name] = DistributedDataParallel(network)
+                self._trained[name] = DistributedDataParallel(network)
             self.optimizers[name] = torch.optim.AdamW(
                 network.parameters(),
-                lr=rate,
+                lr=learning_rate,
                 betas=(config.beta1, config.beta2),
                 weight_decay=config.weight_decay,
             )
-        _place(self.average, device)
+        _move(self.average, device)
         self._precision = torch.autocast(
             device.type, torch.bfloat16, enabled=config.precision == "bfloat16"
         )
 
-    def run(self, name: str, *inputs: Tensor, taught: bool = True) -> Tensor:
-        """The output of a network, in the precision of the recipe.
+    def run(self, name: str, *inputs: Tensor, trained: bool = True) -> Tensor:
+        """Return the output of a network, computed in the precision of the recipe, in float32.
 
         Args:
             name: ``generator``, ``map_discriminator`` or ``point_discriminator``.
             inputs: of the network.
-            taught: the backward pass reaches the weights of the network, and their gradients are
-                averaged over the processes. A discriminator that judges for the generator's sake
-                is not taught.
+            trained: the backward pass reaches the weights of the network, and their gradients are
+                averaged over the processes. False for a discriminator in a step of the generator.
         """
-        network = self._taught[name] if taught else getattr(self, name)
+        network = self._trained[name] if trained else getattr(self, name)
         with self._precision:
             output: Tensor = network(*inputs)
         return output.float()
@@ -90,14 +89,15 @@ class Networks:
         """Set each learning rate to ``factor`` times its highest value."""
         for name, optimizer in self.optimizers.items():
             for group in optimizer.param_groups:
-                group["lr"] = factor * self.rates[name]
+                group["lr"] = factor * self.learning_rates[name]
 
     @torch.no_grad()
     def update_average(self, decay: float, step: int) -> None:
         """Move the average towards the generator.
 
         Args:
-            decay: weight of the old average; lower in the first steps, which have little to say.
+            decay: weight of the old average; it is at most (1 + step) / (10 + step), since the
+                weights of the first steps are poor.
             step: steps done so far.
         """
         decay = min(decay, (1 + step) / (10 + step))
@@ -109,102 +109,39 @@ class Networks:
                 value.copy_(current[name])
 
     def state_dict(self) -> dict[str, Any]:
-        """Weights and optimiser states."""
-        state: dict[str, Any] = {name: getattr(self, name).state_dict() for name in self._modules}
+        """Return the weights and the states of the optimisers."""
+        state: dict[str, Any] = {name: getattr(self, name).state_dict() for name in self._networks}
         state["optimizers"] = {name: opt.state_dict() for name, opt in self.optimizers.items()}
         return state
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """The inverse of :meth:`state_dict`."""
-        for name in self._modules:
+        """Restore what :meth:`state_dict` returned."""
+        for name in self._networks:
             getattr(self, name).load_state_dict(state[name])
         for name, optimizer in self.optimizers.items():
             optimizer.load_state_dict(state["optimizers"][name])
 
     def start_from(self, state: dict[str, Any]) -> None:
-        """Begin with the weights of another run, the generator with its average there.
+        """Take over the weights of another run; the generator those of the average there.
 
         Args:
-            state: what :meth:`state_dict` of the other run gave.
+            state: what :meth:`state_dict` of the other run returned.
 
         Raises:
-            ConfigError: they belong to other networks.
+            ConfigError: the weights belong to networks of another architecture.
         """
         try:
-            for name in self._modules:
+            for name in self._networks:
                 weights = state["average" if name == "generator" else name]
                 getattr(self, name).load_state_dict(weights)
         except RuntimeError as error:
             raise ConfigError(
-                "the run to start from has other networks: give its options of them"
+                "the run to start from has other networks: set the same options of the networks"
             ) from error
 
-    _modules = ("generator", "map_discriminator", "point_discriminator", "average")
+    _networks = ("generator", "map_discriminator", "point_discriminator", "average")
 
 
-def _place(network: nn.Module, device: torch.device) -> None:
+def _move(network: nn.Module, device: torch.device) -> None:
     # Channels-last convolutions take two thirds of the time on a CPU.
     network.to(device, memory_format=torch.channels_last)  # type: ignore[call-overload]
-
-
-def make_generator(config: TrainingConfig) -> Generator | PatchGenerator:
-    """The generator that a recipe asks for, with fresh weights."""
-    attention = attention_of(config)
-    if config.patch == 1:
-        return Generator(config.widths, attention, config.stem, config.noise_stem)
-    return PatchGenerator(
-        config.widths,
-        attention,
-        config.stem,
-        config.patch,
-        config.metrics,
-        config.white_obstacles,
-    )
-
-
-def attention_of(config: TrainingConfig) -> Attention:
-    """The kinds of attention that a recipe asks for, in all three networks."""
-    return Attention(config.channel_attention, config.spatial_attention, config.self_attention)
-
-
-@dataclass(frozen=True)
-class Images:
-    """A batch as the networks see it, (B, 3, S, S) in [-1, 1] each."""
-
-    map: Tensor
-    points: Tensor
-    region: Tensor
-
-
-def encode(batch: Batch) -> Images:
-    """Draw the images of a batch."""
-    height, width = batch.free.shape[-2:]
-    images = (
-        map_image(batch.free),
-        point_image(batch.start, batch.goal, height, width),
-        region_image(batch.region),
-    )
-    return Images(*(image.contiguous(memory_format=torch.channels_last) for image in images))
-
-
-def pick_device(name: str) -> torch.device:
-    """The device of a name; ``auto`` is a GPU if there is one.
-
-    Of the processes that ``torchrun`` starts on a machine each gets its own GPU, unless the name
-    has a number. The GPU is made the current one, through which the processes talk.
-
-    Raises:
-        ConfigError: no such device.
-    """
-    if name == "auto":
-        name = "cuda" if torch.cuda.is_available() else "cpu"
-    try:
-        device = torch.device(name)
-        if device.type == "cuda" and device.index is None:
-            device = torch.device("cuda", int(os.environ.get("LOCAL_RANK", "0")))
-        torch.empty(1, device=device)
-        if device.type == "cuda":
-            torch.cuda.set_device(device)
-    except (RuntimeError, AssertionError) as error:
-        raise ConfigError(f"cannot use device {name!r}: {error}") from error
-    return device

@@ -15,17 +15,18 @@ import torch
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from ..common.files import make_folder, write_atomically
 from ..datasets.dataset import Tasks
 from ..errors import ConfigError
-from .batches import Batch, check_trainable, make_batch, scaled_down
-from .checkpoints import BEST, LAST, SCHEMA, best_generator, load_checkpoint, save_atomically
+from .batches import Batch, check_trainable, encode, make_batch, scale_down
+from .checkpoints import BEST, LAST, SCHEMA, best_generator, load_checkpoint, save_checkpoint
 from .config import TrainingConfig
-from .distributed import ProcessGroup, process_group
-from .gan import Networks, encode, pick_device
+from .distributed import ProcessGroup, pick_device, process_group
+from .gan import Gan
 from .schedule import learning_rate_factor, plateau_factor
-from .steps import adversarial_shares, discriminator_step, generator_step
+from .steps import adversarial_weights, discriminator_step, generator_step
 from .task_sources import TaskSource
-from .tensorboard import scalar_log, write_scalars
+from .tensorboard import open_log, write_scalars
 from .validation import evaluate, trivial_scores
 
 LOG = "log.jsonl"
@@ -33,32 +34,32 @@ LOG = "log.jsonl"
 
 @dataclass
 class Run:
-    """Everything that changes while a run goes on, and that a resumed run needs.
+    """Everything that changes during a run, and that a resumed run needs.
 
     Attributes:
-        networks: weights and optimiser states.
-        rng: draws the order of the tasks and their augmentation.
-        noise_rng: draws the noise; on the CPU, so that a run does not depend on the device.
-        history: what the log says, one entry an epoch.
+        gan: weights and optimiser states.
+        rng: random numbers of the order of the tasks and of their augmentation.
+        noise_rng: of the noise; on the CPU, so that a run does not depend on the device.
+        history: the entries of the log, one for each epoch.
     """
 
-    networks: Networks
+    gan: Gan
     rng: np.random.Generator
     noise_rng: torch.Generator
     history: list[dict[str, Any]] = field(default_factory=list)
 
     def state_dict(self) -> dict[str, Any]:
-        """The run as a checkpoint holds it."""
+        """Return the run as a checkpoint holds it."""
         return {
-            "networks": self.networks.state_dict(),
+            "gan": self.gan.state_dict(),
             "rng": json.dumps(self.rng.bit_generator.state),
             "noise_rng": self.noise_rng.get_state(),
             "history": self.history,
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """The inverse of :meth:`state_dict`."""
-        self.networks.load_state_dict(state["networks"])
+        """Restore what :meth:`state_dict` returned."""
+        self.gan.load_state_dict(state["gan"])
         self.rng.bit_generator.state = json.loads(state["rng"])
         self.noise_rng.set_state(state["noise_rng"])
         self.history = state["history"]
@@ -77,12 +78,11 @@ def train(
 ) -> dict[str, Any]:
     """Train the three networks.
 
-    After each epoch the folder holds ``last.pt`` (everything needed to go on), ``best.pt`` (the
+    After each epoch the folder holds ``last.pt`` (everything needed to resume), ``best.pt`` (the
     epoch with the highest region IoU on the validation tasks, the one to export) and ``log.jsonl``
-    (one line an epoch). An interrupted run loses at most the epoch under way, and a resumed run
-    gives the same weights as one that was never interrupted.
-
-    Under ``torchrun`` the processes share each batch, and the first one writes the files.
+    (one line for each epoch). An interrupted run loses at most the current epoch, and a resumed
+    run gives the same weights as one that was never interrupted. Under ``torchrun`` each process
+    trains on its shard of each batch, and the first one writes the files.
 
     Args:
         source: of the tasks, see :mod:`cbagan_ompl.training.task_sources`.
@@ -96,8 +96,8 @@ def train(
         tensorboard: write losses and scores for TensorBoard into the folder as well.
 
     Returns:
-        ``validation`` and ``test`` scores of the best epoch, ``trivial`` scores of predictors that
-        know nothing, on the test tasks, the ``epoch`` number and the path of the ``checkpoint``.
+        ``validation`` and ``test`` scores of the best epoch, ``trivial`` scores of the trivial
+        baselines on the test tasks, the ``epoch`` number and the path of the ``checkpoint``.
 
     Raises:
         ConfigError: ``resume`` with another recipe or other tasks, or without it although the
@@ -105,54 +105,25 @@ def train(
             such device; the loss is not finite; or the processes cannot share a batch evenly.
         DatasetError: the images are of a size that the networks cannot take.
         MissingDependencyError: ``tensorboard`` without the package of that name.
-        ModelError: a checkpoint that cannot be read.
+        ModelError: a checkpoint that cannot be read or written.
     """
-    folder = Path(output)
-    place = pick_device(device)
-    check_trainable(source.side, config)
-    with process_group(place) as group:
+    folder, target = Path(output), pick_device(device)
+    check_trainable(source.size, config)
+    with process_group(target) as group:
         if config.batch_size % group.size:
             raise ConfigError(
                 f"batches of {config.batch_size} cannot be shared evenly by {group.size} processes"
             )
-        if group.leads:
+        if group.is_leader:
             _prepare_folder(folder, resume)
-        run = _new_run(config, place, group, start_from)
+        run = _start_run(config, target, group, start_from)
         if resume:
-            state = _matching_checkpoint(folder / LAST, config, source) if group.leads else None
+            state = _load_matching(folder / LAST, config, source) if group.is_leader else None
             run.load_state_dict(group.from_leader(state))
-        progress = progress and group.leads
-        if progress:
-            for name, scores in trivial_scores(source.validation).items():
-                print(f"for comparison, {name}: {_summary(scores)}")
-        log = scalar_log(folder, len(run.history)) if tensorboard and group.leads else None
-        for epoch in range(len(run.history), config.epochs):
-            entry = _epoch(run, config, source, place, epoch, progress)
-            run.history.append(entry)
-            if group.leads:
-                _save(run, config, source, folder)
-                if log is not None:
-                    write_scalars(log, entry)
-            if progress:
-                scores, seconds = entry["validation"], entry["seconds"]
-                print(f"epoch {epoch + 1}/{config.epochs}: {_summary(scores)}, {seconds:.0f} s")
-        return group.from_leader(_finish(folder, source, place, config) if group.leads else None)
-
-
-def _new_run(
-    config: TrainingConfig,
-    device: torch.device,
-    group: ProcessGroup,
-    start_from: str | PathLike[str] | None,
-) -> Run:
-    run = Run(
-        Networks(config, device, group),
-        np.random.default_rng(config.seed),
-        torch.Generator().manual_seed(config.seed),
-    )
-    if start_from is not None:
-        run.networks.start_from(load_checkpoint(start_from)["networks"])
-    return run
+        _run_epochs(run, config, source, folder, target, progress, tensorboard)
+        return group.from_leader(
+            _finish(folder, source, target, config) if group.is_leader else None
+        )
 
 
 def _prepare_folder(folder: Path, resume: bool) -> None:
@@ -160,13 +131,54 @@ def _prepare_folder(folder: Path, resume: bool) -> None:
         raise ConfigError(
             f"{folder} holds a run already; resume it (--resume), or choose another folder"
         )
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError(f"cannot make the folder {folder}: {error.strerror or error}") from error
+    make_folder(folder)
 
 
-def _epoch(
+def _start_run(
+    config: TrainingConfig,
+    device: torch.device,
+    group: ProcessGroup,
+    start_from: str | PathLike[str] | None,
+) -> Run:
+    run = Run(
+        Gan(config, device, group),
+        np.random.default_rng(config.seed),
+        torch.Generator().manual_seed(config.seed),
+    )
+    if start_from is not None:
+        run.gan.start_from(load_checkpoint(start_from)["gan"])
+    return run
+
+
+def _run_epochs(
+    run: Run,
+    config: TrainingConfig,
+    source: TaskSource,
+    folder: Path,
+    device: torch.device,
+    progress: bool,
+    tensorboard: bool,
+) -> None:
+    """Train until all epochs are done; the leading process reports and writes files."""
+    leads = run.gan.group.is_leader
+    progress = progress and leads
+    if progress:
+        for name, scores in trivial_scores(source.validation).items():
+            print(f"for comparison, {name}: {_summarize(scores)}")
+    log = open_log(folder, len(run.history)) if tensorboard and leads else None
+    for epoch in range(len(run.history), config.epochs):
+        entry = _run_epoch(run, config, source, device, epoch, progress)
+        run.history.append(entry)
+        if leads:
+            _save(run, config, source, folder)
+            if log is not None:
+                write_scalars(log, entry)
+        if progress:
+            scores, seconds = entry["validation"], entry["seconds"]
+            print(f"epoch {epoch + 1}/{config.epochs}: {_summarize(scores)}, {seconds:.0f} s")
+
+
+def _run_epoch(
     run: Run,
     config: TrainingConfig,
     source: TaskSource,
@@ -174,14 +186,14 @@ def _epoch(
     epoch: int,
     progress: bool,
 ) -> dict[str, Any]:
-    """One pass over the tasks, and its entry in the log."""
+    """Train for one pass over the tasks, validate, and return the entry of the log."""
     began = time.perf_counter()
     means = _train_epoch(run, config, source.epoch(epoch), device, epoch, progress)
-    networks = run.networks
-    model = networks.average if config.ema_decay else networks.generator
-    scores = networks.group.from_leader(
-        evaluate(model, source.validation, device, config.batch_size)
-        if networks.group.leads
+    gan = run.gan
+    generator = gan.average if config.ema_decay else gan.generator
+    scores = gan.group.from_leader(
+        evaluate(generator, source.validation, device, config.batch_size)
+        if gan.group.is_leader
         else None
     )
     seconds = round(time.perf_counter() - began, 1)
@@ -196,25 +208,25 @@ def _train_epoch(
     epoch: int,
     progress: bool,
 ) -> dict[str, float]:
-    """Means of the losses over the steps in which they were computed."""
+    """Return the means of the losses over the steps in which they were computed."""
     order = run.rng.permutation(len(tasks))
-    size = _batch_size(len(order), config, run.networks.group)
+    size = _batch_size(len(order), config, run.gan.group)
     # The tasks that fill no batch wait for the next epoch, which has another order.
     steps = len(order) // size
     plateau = plateau_factor(config, [entry["validation"]["iou"] for entry in run.history])
     totals: dict[str, list[float]] = {}
-    run.networks.generator.train()
+    run.gan.generator.train()
     bar = tqdm(range(steps), desc=f"epoch {epoch + 1}", leave=False, disable=not progress)
     for i in bar:
         step = epoch * steps + i
-        run.networks.set_learning_rates(plateau * learning_rate_factor(config, step, steps))
+        run.gan.set_learning_rates(plateau * learning_rate_factor(config, step, steps))
         indices = order[i * size : (i + 1) * size]
         values = _step(run, config, tasks, indices, device, step)
         if not all(math.isfinite(value) for value in values.values()):
             raise ConfigError(
                 f"the loss is not finite in epoch {epoch + 1}; lower the learning rates"
             )
-        run.networks.update_average(config.ema_decay, step)
+        run.gan.update_average(config.ema_decay, step)
         for name, value in values.items():
             totals.setdefault(name, []).append(value)
         bar.set_postfix(segmentation=f"{values['segmentation']:.3f}")
@@ -222,7 +234,7 @@ def _train_epoch(
 
 
 def _batch_size(tasks: int, config: TrainingConfig, group: ProcessGroup) -> int:
-    """Tasks in a batch: where there are too few, what all processes can have the same number of."""
+    """Return the number of tasks in a batch: with few tasks, as many as divide evenly."""
     size = min(tasks, config.batch_size)
     size -= size % group.size
     if size == 0:
@@ -238,8 +250,8 @@ def _step(
     device: torch.device,
     step: int,
 ) -> dict[str, float]:
-    """Teach the networks with one batch, or this process's share of it."""
-    networks = run.networks
+    """Train the networks with one batch, or this process's shard of it; return the losses."""
+    gan = run.gan
     batch = make_batch(
         tasks,
         indices,
@@ -249,17 +261,17 @@ def _step(
         reversal=config.reversal,
     )
     if len(config.scales) > 1:
-        batch = scaled_down(batch, int(run.rng.choice(config.scales)))
+        batch = scale_down(batch, int(run.rng.choice(config.scales)))
     noise = torch.randn(batch.free.shape, generator=run.noise_rng).to(device)
-    share = networks.group.share
-    batch, noise = Batch(*map(share, vars(batch).values())), share(noise)
+    shard = gan.group.shard
+    batch, noise = Batch(*map(shard, vars(batch).values())), shard(noise)
     images = encode(batch)
-    fake = networks.run("generator", images.map, images.points, noise)
+    fake = gan.run("generator", images.map, images.points, noise)
     if step % config.adversarial_every:
-        return generator_step(networks, config, batch, images, fake, None)
-    errors = discriminator_step(networks, images, fake)
-    shares = adversarial_shares(config, errors)
-    return errors | generator_step(networks, config, batch, images, fake, shares)
+        return generator_step(gan, config, batch, images, fake, None)
+    errors = discriminator_step(gan, images, fake)
+    weights = adversarial_weights(config, errors)
+    return errors | generator_step(gan, config, batch, images, fake, weights)
 
 
 def _save(run: Run, config: TrainingConfig, source: TaskSource, folder: Path) -> None:
@@ -271,13 +283,13 @@ def _save(run: Run, config: TrainingConfig, source: TaskSource, folder: Path) ->
     }
     ious = [entry["validation"]["iou"] for entry in run.history]
     if ious[-1] == max(ious):
-        save_atomically(state, folder / BEST)
-    save_atomically(state, folder / LAST)
-    lines = "".join(json.dumps(entry) + "\n" for entry in run.history)
-    (folder / LOG).write_text(lines, encoding="utf-8")
+        save_checkpoint(state, folder / BEST)
+    save_checkpoint(state, folder / LAST)
+    write_atomically(folder / LOG, "".join(json.dumps(entry) + "\n" for entry in run.history))
 
 
-def _matching_checkpoint(path: Path, config: TrainingConfig, source: TaskSource) -> dict[str, Any]:
+def _load_matching(path: Path, config: TrainingConfig, source: TaskSource) -> dict[str, Any]:
+    """Return the checkpoint to resume from, which must have the same recipe and tasks."""
     state = load_checkpoint(path)
     saved, wanted = state["config"], config.to_dict()
     changed = [name for name in wanted if saved.get(name) != wanted[name]]
@@ -299,7 +311,7 @@ def _finish(
     generator = best_generator(best).to(device)
     best["test"] = evaluate(generator, source.test, device, config.batch_size)
     best["trivial"] = trivial_scores(source.test)
-    save_atomically(best, folder / BEST)
+    save_checkpoint(best, folder / BEST)
     return {
         "checkpoint": str(folder / BEST),
         "epoch": best["history"][-1]["epoch"],
@@ -309,7 +321,7 @@ def _finish(
     }
 
 
-def _summary(scores: dict[str, float]) -> str:
+def _summarize(scores: dict[str, float]) -> str:
     return (
         f"region IoU {scores['iou']:.3f}, Dice {scores['dice']:.3f}, "
         f"connectivity {scores['connectivity']:.1%}"

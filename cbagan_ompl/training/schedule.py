@@ -9,12 +9,22 @@ from .config import TrainingConfig
 
 
 def learning_rate_factor(config: TrainingConfig, step: int, steps_per_epoch: int) -> float:
-    """Share of the highest learning rate that the schedule gives a step.
+    """Return the learning rate of a step as a fraction of the highest one.
+
+    ``exponential`` is decay ^ epoch. ``one-cycle`` rises linearly to 1 over the first
+    ``warmup`` of the steps and falls along half a cosine to 0 (Smith and Topin, "Super-convergence:
+    very fast training of neural networks using large learning rates", 2018,
+    https://arxiv.org/abs/1708.07120; the cosine is PyTorch's).
 
     Args:
-        config: names the schedule.
+        config: has the schedule.
         step: number of the step, from 0.
         steps_per_epoch: steps in one epoch.
+
+    Example:
+        >>> config = TrainingConfig(epochs=2, warmup=0.1)
+        >>> [round(learning_rate_factor(config, step, 10), 2) for step in (0, 2, 11, 19)]
+        [0.33, 1.0, 0.5, 0.01]
     """
     if config.schedule == "exponential":
         return config.decay ** (step // steps_per_epoch)
@@ -26,7 +36,10 @@ def learning_rate_factor(config: TrainingConfig, step: int, steps_per_epoch: int
 
 
 def plateau_factor(config: TrainingConfig, scores: Sequence[float]) -> float:
-    """Factor on the learning rates after epochs that brought nothing (ReduceLROnPlateau).
+    """Return the factor on the learning rates after epochs without a better score.
+
+    The same as PyTorch's ReduceLROnPlateau: the epoch after ``plateau_patience`` epochs without
+    a better score lowers them.
 
     Args:
         config: ``plateau_patience`` and ``plateau_factor``.
@@ -38,7 +51,6 @@ def plateau_factor(config: TrainingConfig, scores: Sequence[float]) -> float:
     for score in scores:
         waited = 0 if score > best else waited + 1
         best = max(best, score)
-        # As in PyTorch: the patience is borne, the epoch after it is not.
         if waited > config.plateau_patience:
             factor, waited = factor * config.plateau_factor, 0
     return factor

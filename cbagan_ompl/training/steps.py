@@ -9,17 +9,17 @@ from torch import Tensor
 
 from ..networks.encoding import region_probability
 from . import losses
-from .batches import Batch
+from .batches import Batch, Images
 from .config import TrainingConfig
-from .gan import Images, Networks
+from .gan import Gan
 
 
-def discriminator_step(networks: Networks, images: Images, fake: Tensor) -> dict[str, float]:
-    """Teach both discriminators to tell the true regions from the generated ones.
+def discriminator_step(gan: Gan, images: Images, fake: Tensor) -> dict[str, float]:
+    """Train both discriminators to tell the true regions from the generated ones.
 
     Args:
-        networks: the weights of the two discriminators change, those of the generator do not.
-        images: a batch, or this process's share of it.
+        gan: the weights of its two discriminators change, those of its generator do not.
+        images: a batch, or this process's shard of it.
         fake: the generated region images of the batch; no gradient flows back into them.
 
     Returns:
@@ -32,31 +32,31 @@ def discriminator_step(networks: Networks, images: Images, fake: Tensor) -> dict
         ("point_discriminator", images.points),
     ):
         loss = losses.discriminator_loss(
-            networks.run(name, condition, images.region), networks.run(name, condition, fake)
+            gan.run(name, condition, images.region), gan.run(name, condition, fake)
         )
-        _descend(loss, networks.optimizers[name])
+        _descend(loss, gan.optimizers[name])
         values[name] = loss.item()
-    return networks.group.means(values)
+    return gan.group.means(values)
 
 
 def generator_step(
-    networks: Networks,
+    gan: Gan,
     config: TrainingConfig,
     batch: Batch,
     images: Images,
     fake: Tensor,
-    shares: tuple[float, float] | None,
+    weights: tuple[float, float] | None,
 ) -> dict[str, float]:
-    """Teach the generator.
+    """Train the generator.
 
     Args:
-        networks: the weights of the generator change, those of the discriminators do not.
-        config: weights of the losses.
-        batch: tasks with their regions, or this process's share of them.
+        gan: the weights of its generator change, those of its discriminators do not.
+        config: factors of the losses.
+        batch: tasks with their regions, or this process's shard of them.
         images: the same as images.
         fake: the generator's images of the regions, with their graph.
-        shares: of the map and the point discriminator in the adversarial loss, adding up to 1;
-            None where they have no say in this step.
+        weights: of the map and the point discriminator in the adversarial loss, adding up to 1;
+            None for a step without an adversarial loss.
 
     Returns:
         The parts of the loss, means over the processes.
@@ -72,16 +72,16 @@ def generator_step(
             config.positive_weight,
         ),
     }
-    judges = (networks.map_discriminator, networks.point_discriminator)
-    if shares is not None:
-        # The judges pass gradients on to the image, but collect none for themselves.
-        for judge in judges:
-            judge.requires_grad_(False)
-        by_map = networks.run("map_discriminator", images.map, fake, taught=False)
-        by_points = networks.run("point_discriminator", images.points, fake, taught=False)
+    discriminators = (gan.map_discriminator, gan.point_discriminator)
+    if weights is not None:
+        # The discriminators pass gradients on to the image, but collect none for themselves.
+        for discriminator in discriminators:
+            discriminator.requires_grad_(False)
+        map_logits = gan.run("map_discriminator", images.map, fake, trained=False)
+        point_logits = gan.run("point_discriminator", images.points, fake, trained=False)
         parts["adversarial"] = 2 * (
-            shares[0] * losses.adversarial_loss(by_map)
-            + shares[1] * losses.adversarial_loss(by_points)
+            weights[0] * losses.adversarial_loss(map_logits)
+            + weights[1] * losses.adversarial_loss(point_logits)
         )
     loss = losses.generator_loss(
         parts.get("adversarial", fake.new_zeros(())),
@@ -90,22 +90,25 @@ def generator_step(
         config.adversarial_weight,
         config.pixel_weight,
     )
-    _descend(loss, networks.optimizers["generator"], config.clip_norm)
-    for judge in judges:
-        judge.requires_grad_(True)
-    return networks.group.means({name: value.item() for name, value in parts.items()})
+    _descend(loss, gan.optimizers["generator"], config.clip_norm)
+    for discriminator in discriminators:
+        discriminator.requires_grad_(True)
+    return gan.group.means({name: value.item() for name, value in parts.items()})
 
 
-def adversarial_shares(config: TrainingConfig, errors: Mapping[str, float]) -> tuple[float, float]:
-    """What the map and the point discriminator weigh in the generator's loss; adds up to 1.
+def adversarial_weights(config: TrainingConfig, errors: Mapping[str, float]) -> tuple[float, float]:
+    """Return the weights of the map and the point discriminator in the generator's loss.
 
     Args:
         config: ``adaptive_alpha``.
         errors: what :func:`discriminator_step` returned.
+
+    Returns:
+        Two numbers that add up to 1.
     """
     if not config.adaptive_alpha:
         return 0.5, 0.5
-    return losses.adaptive_shares(
+    return losses.adaptive_weights(
         errors["map_discriminator"], errors["point_discriminator"], config.adaptive_alpha
     )
 

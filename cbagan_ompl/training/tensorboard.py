@@ -1,18 +1,18 @@
-"""Losses and scores of a training run for TensorBoard, which is an optional package."""
+"""Losses and scores of a training run for TensorBoard, an optional package."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import MissingDependencyError
+from ..common.validation import require
 
 if TYPE_CHECKING:
     from torch.utils.tensorboard import SummaryWriter
 
 
-def scalar_log(folder: Path, epochs: int) -> SummaryWriter:
-    """A log in the folder of a run; what it says of epochs that will be repeated is dropped.
+def open_log(folder: Path, epochs: int) -> SummaryWriter:
+    """Open a log in the folder of a run, without its entries of epochs that will be repeated.
 
     Args:
         folder: of the run.
@@ -21,13 +21,9 @@ def scalar_log(folder: Path, epochs: int) -> SummaryWriter:
     Raises:
         MissingDependencyError: TensorBoard is not installed.
     """
-    try:
-        from torch.utils.tensorboard import SummaryWriter
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"logs for TensorBoard need the package tensorboard ({error}); "
-            "install it with: pip install 'cbagan-ompl[tensorboard]'"
-        ) from error
+    require("torch.utils.tensorboard", "tensorboard")
+    from torch.utils.tensorboard import SummaryWriter
+
     return SummaryWriter(str(folder), purge_step=epochs + 1)
 
 

@@ -1,4 +1,4 @@
-"""Scores of a generator on tasks, next to predictors that know nothing."""
+"""Scores of a generator on tasks, next to those of trivial baselines."""
 
 from __future__ import annotations
 
@@ -14,14 +14,20 @@ from ..evaluation.baselines import trivial_baselines
 from ..evaluation.metrics import region_scores
 from ..networks.encoding import region_probability
 from ..sampling.heatmap import REGION_THRESHOLD
-from .batches import make_batch
-from .gan import encode
+from .batches import encode, make_batch
 
 
 def evaluate(
     generator: nn.Module, tasks: Tasks, device: torch.device, batch_size: int
 ) -> dict[str, float]:
-    """Scores of a generator's regions, see :func:`cbagan_ompl.evaluation.metrics.region_scores`."""
+    """Return scores of a generator, see :func:`cbagan_ompl.evaluation.metrics.region_scores`.
+
+    Args:
+        generator: on the device; afterwards in evaluation mode.
+        tasks: with their true regions.
+        device: to predict on.
+        batch_size: tasks at a time.
+    """
     predicted = np.concatenate(list(_predict(generator, tasks, device, batch_size)))
     return region_scores(
         predicted, tasks.region >= REGION_THRESHOLD, tasks.free, tasks.start, tasks.goal
@@ -42,7 +48,7 @@ def _predict(
 
 
 def trivial_scores(tasks: Tasks) -> dict[str, dict[str, float]]:
-    """Scores of two predictors that know nothing: all free space, and a straight band."""
+    """Return the scores of the trivial baselines: all free space, and a straight band."""
     truth, free = tasks.region >= REGION_THRESHOLD, tasks.free
     return {
         name: region_scores(predicted, truth, free, tasks.start, tasks.goal)

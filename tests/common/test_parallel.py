@@ -3,11 +3,15 @@ from __future__ import annotations
 import os
 import signal
 import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
+from multiprocessing import active_children
+from multiprocessing.context import ForkServerProcess
 
 import pytest
 
-from cbagan_ompl.common.parallel import fork_server, interrupts_held
+from cbagan_ompl import DatasetError
+from cbagan_ompl.common.parallel import fork_server, interrupts_held, run_all
 
 
 @pytest.mark.usefixtures("interruptible")
@@ -56,3 +60,24 @@ def test_processes_do_not_hear_interrupts() -> None:
         process.start()
     process.join()
     assert process.exitcode == 0
+
+
+def test_a_process_that_dies() -> None:
+    with pytest.raises(DatasetError, match="a process that worked on the maps has died"):
+        run_all(os._exit, [(3,)], 1, "maps", progress=False)
+
+
+@pytest.mark.usefixtures("interruptible")
+def test_an_interrupt_while_processes_start_leaves_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    start, started = ForkServerProcess.start, []
+
+    def interrupt_and_start(process: ForkServerProcess) -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+        start(process)
+        started.append(process)
+
+    monkeypatch.setattr(ForkServerProcess, "start", interrupt_and_start)
+    with pytest.raises(KeyboardInterrupt):
+        run_all(time.sleep, [(3600,), (3600,)], 2, "maps", progress=False)
+    assert started
+    assert not active_children()

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cbagan_ompl.evaluation.metrics import confusion, connects, region_scores
+from cbagan_ompl.evaluation.metrics import confusion, region_scores, task_scores
+from cbagan_ompl.maps.connectivity import connects
 
 
 def mask(*rows: str) -> NDArray[np.bool_]:
@@ -27,31 +28,43 @@ def test_pooled_scores_weigh_pixels_and_means_weigh_images() -> None:
     small, large = mask("#...", "....", "...."), mask("####", "####", "####")
     counts = confusion(np.stack((small, ~large)), np.stack((small, large)))
     assert counts.iou().tolist() == [1, 0]
-    assert float(counts.pooled().iou()) == pytest.approx(1 / 13)
+    assert float(counts.pool().iou()) == pytest.approx(1 / 13)
 
 
 @pytest.mark.parametrize("truth", [TRUTH, np.zeros_like(TRUTH)])
 def test_an_empty_prediction_scores_zero(truth: NDArray[np.bool_]) -> None:
-    ends = np.array([[0.5, 0.5]]), np.array([[3.5, 2.5]])
-    scores = region_scores(np.zeros((1, 3, 4), bool), truth[None], np.ones((1, 3, 4), bool), *ends)
+    endpoints = np.array([[0.5, 0.5]]), np.array([[3.5, 2.5]])
+    scores = region_scores(
+        np.zeros((1, 3, 4), bool), truth[None], np.ones((1, 3, 4), bool), *endpoints
+    )
     assert set(scores.values()) == {0}
 
 
-def test_joins_is_8_connected() -> None:
+def test_regions_are_8_connected() -> None:
     diagonal = mask("#..", ".#.", "..#")
-    assert connects(diagonal, (0, 0), (2, 2))
-    assert not connects(mask("#..", "...", "..#"), (0, 0), (2, 2))
+    assert connects(diagonal, (0, 0), (2, 2), connectivity=8)
+    assert not connects(mask("#..", "...", "..#"), (0, 0), (2, 2), connectivity=8)
 
 
 def test_start_and_goal_count_as_region() -> None:
-    assert connects(mask("...", ".#.", "..."), (0, 0), (2, 2))
+    assert connects(mask("...", ".#.", "..."), (0, 0), (2, 2), connectivity=8)
 
 
 def test_connectivity_stops_at_obstacles() -> None:
     region = np.ones((2, 3, 3), bool)
     free = region.copy()
     free[1, :, 1] = False
-    ends = np.array([[0.5, 0.5]] * 2), np.array([[2.5, 2.5]] * 2)
-    scores = region_scores(region, region, free, *ends)
+    endpoints = np.array([[0.5, 0.5]] * 2), np.array([[2.5, 2.5]] * 2)
+    scores = region_scores(region, region, free, *endpoints)
     assert scores["connectivity"] == 0.5
     assert scores["iou"] == scores["dice_per_image"] == 1
+
+
+def test_8_and_4_connected() -> None:
+    diagonal = np.eye(3, dtype=np.bool_)
+    assert connects(diagonal, (0, 0), (2, 2), connectivity=8)
+    assert not connects(diagonal, (0, 0), (2, 2), connectivity=4)
+    endpoints = np.array([[0.5, 0.5]]), np.array([[2.5, 2.5]])
+    tasks = task_scores(diagonal[None], diagonal[None], np.ones((1, 3, 3), bool), *endpoints)
+    assert (tasks.connected.tolist(), tasks.connected_4.tolist()) == ([True], [False])
+    assert tasks.means(np.ones(1))["area"] == pytest.approx(1 / 3)

@@ -11,13 +11,16 @@ import numpy as np
 import torch
 
 from cbagan_ompl.datasets.dataset import load_dataset
+from cbagan_ompl.networks.config import NetworkConfig
 from cbagan_ompl.training.config import TrainingConfig
 from cbagan_ompl.training.distributed import process_group
-from cbagan_ompl.training.gan import Networks
+from cbagan_ompl.training.gan import Gan
 from cbagan_ompl.training.loop import Run, _step
 
 CONFIG = TrainingConfig(
-    batch_size=8, widths=(4, 4, 6, 8), discriminator_width=4, adaptive_alpha=3.0
+    network=NetworkConfig(widths=(4, 4, 6, 8), discriminator_width=4),
+    batch_size=8,
+    adaptive_alpha=3.0,
 )
 
 
@@ -25,18 +28,18 @@ def main(folder: str, output: str) -> None:
     cpu = torch.device("cpu")
     tasks = load_dataset(folder).train
     with process_group(cpu) as group:
-        networks = Networks(CONFIG, cpu, group)
+        gan = Gan(CONFIG, cpu, group)
         # A discriminator's first step would turn rounding errors of tiny gradients into a weight.
-        networks.set_learning_rates(1e-6)
-        run = Run(networks, np.random.default_rng(0), torch.Generator().manual_seed(0))
+        gan.set_learning_rates(1e-6)
+        run = Run(gan, np.random.default_rng(0), torch.Generator().manual_seed(0))
         _step(run, CONFIG, tasks, np.arange(8), cpu, 0)
-        if group.leads:
+        if group.is_leader:
             gradients = {
                 f"{name}.{key}": parameter.grad
-                for name in networks.rates
-                for key, parameter in getattr(networks, name).named_parameters()
+                for name in gan.learning_rates
+                for key, parameter in getattr(gan, name).named_parameters()
             }
-            buffers = dict(networks.generator.named_buffers())
+            buffers = dict(gan.generator.named_buffers())
             torch.save({**gradients, **buffers}, output)
 
 

@@ -14,10 +14,10 @@ def store(folder: Path, dataset: Path, regions: np.ndarray, listed: bool) -> Pat
     lines = ["true_roi,pred_roi,iou"]
     for k, (label, region) in enumerate(zip(label_files(dataset, "test"), regions, strict=True)):
         name = f"roi_{k}.png" if listed else f"{label.parent.name}/{label.name}"
-        picture = np.full((*region.shape, 3), 250, np.uint8)
-        picture[region > 0] = (10, 240, 20)
+        image = np.full((*region.shape, 3), 250, np.uint8)
+        image[region > 0] = (10, 240, 20)
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        cv2.imwrite(str(folder / name), picture)
+        cv2.imwrite(str(folder / name), image)
         lines.append(f"dataset/tasks/{label.parent.name}/{label.name},results/{name},0.5")
     if listed:
         (folder / "results.csv").write_text("\n".join(lines) + "\n")

@@ -1,18 +1,26 @@
-"""A training set of a few simple tasks, written in the published layout."""
+"""Small training sets in the published layout, written by hand or generated."""
 
 from __future__ import annotations
 
 import csv
+import filecmp
+from dataclasses import fields
 from pathlib import Path
 
 import cv2
 import numpy as np
 
+from cbagan_ompl.datasets.dataset import Tasks
+from cbagan_ompl.datasets.generation import GenerationSettings, generate
+
 SIDE = 32
+
+#: Of :func:`generate_small_set`.
+SMALL = GenerationSettings(maps=6, tasks=3, copies=2, runs=3, generators=("blocks", "triangles"))
 
 
 def write_training_set(folder: Path, maps: int = 2, tasks: int = 10) -> Path:
-    """A block in the middle of each map; the region is an L around it. Every fifth is a test."""
+    """Write maps with a block in the middle; the region is an L around it, every fifth a test."""
     rng = np.random.default_rng(0)
     (folder / "maps").mkdir(parents=True)
     rows = []
@@ -37,3 +45,25 @@ def write_training_set(folder: Path, maps: int = 2, tasks: int = 10) -> Path:
         with (folder / f"{name}.csv").open("w", newline="") as file:
             csv.writer(file).writerows([("map", "task", "roi"), *part])
     return folder
+
+
+def generate_small_set(folder: Path) -> Path:
+    generate(folder, SMALL, jobs=2, resume=False, progress=False)
+    return folder
+
+
+def relative_files(root: Path) -> set[str]:
+    return {str(path.relative_to(root)) for path in root.rglob("*") if path.is_file()}
+
+
+def assert_same_files(one: Path, other: Path) -> None:
+    names = relative_files(one)
+    assert names == relative_files(other)
+    assert filecmp.cmpfiles(one, other, names, shallow=False)[1:] == ([], [])
+
+
+def equal_tasks(one: Tasks, other: Tasks) -> bool:
+    return all(
+        np.array_equal(getattr(one, field.name), getattr(other, field.name))
+        for field in fields(Tasks)
+    )

@@ -1,4 +1,4 @@
-"""The map families, and that the bundled maps are what the script draws."""
+"""The map generators, and that the bundled maps are what the script generates."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cbagan_ompl.errors import ConfigError
-from cbagan_ompl.map_generators import MAP_GENERATORS, MIN_SIDE, bug_trap, narrow_passage
+from cbagan_ompl.map_generators import MAP_GENERATORS, MIN_SIZE, bug_trap, narrow_passage
 from cbagan_ompl.map_generators.randomization import randomized_map
 from cbagan_ompl.maps.grid_map import GridMap
 from cbagan_ompl.maps.loading import bundled_folder, bundled_maps
@@ -25,8 +25,8 @@ def script():
     return module
 
 
-#: Least and greatest free share of the families whose measures do not follow the side of the map.
-SHARES = {
+#: Least and greatest free fraction of generators whose dimensions do not follow the map's size.
+FREE_FRACTIONS = {
     "blocked_cells": (0.3, 0.97),
     "caves": (0.05, 0.81),
     "cell_maze": (0.4, 0.98),
@@ -38,77 +38,77 @@ SHARES = {
     "room_grid": (0.6, 0.98),
     "shelves": (0.35, 0.99),
 }
-FOLLOWING = sorted(set(MAP_GENERATORS) - set(SHARES))
-SIZES = [(MIN_SIDE, MIN_SIDE), (64, 150), (220, 96)]
+FOLLOWING = sorted(set(MAP_GENERATORS) - set(FREE_FRACTIONS))
+SIZES = [(MIN_SIZE, MIN_SIZE), (64, 150), (220, 96)]
 
 
-def checked(family, seed, width, height):
-    """A map that has the right shape, and whose free pixels are all connected."""
-    free = MAP_GENERATORS[family](np.random.default_rng(seed), width, height)
+def generate_checked(generator, seed, width, height):
+    """Return a map, after a check of its shape and that its free pixels are connected."""
+    free = MAP_GENERATORS[generator](np.random.default_rng(seed), width, height)
     assert free.shape == (height, width)
     assert free.dtype == np.bool_
     assert GridMap(free).components.max() == 1
     return free
 
 
-def test_every_family_is_tested_for_its_free_share():
-    assert set(SHARES) < set(MAP_GENERATORS)
+def test_every_generator_is_tested_for_its_free_fraction():
+    assert set(FREE_FRACTIONS) < set(MAP_GENERATORS)
     assert len(FOLLOWING) == 11
 
 
-@pytest.mark.parametrize("family", SHARES)
+@pytest.mark.parametrize("generator", FREE_FRACTIONS)
 @pytest.mark.parametrize(("width", "height"), [*SIZES, (64, 64), (256, 256)])
-def test_families_of_every_scale(family, width, height):
-    least, most = SHARES[family]
+def test_generators_of_every_scale(generator, width, height):
+    least, most = FREE_FRACTIONS[generator]
     for seed in range(8):
-        assert least < checked(family, seed, width, height).mean() < most
+        assert least < generate_checked(generator, seed, width, height).mean() < most
 
 
-@pytest.mark.parametrize("family", ["offices", "shelves"])
-def test_no_map_is_all_free(family):
-    # Of so many small maps some would have room for neither walls nor shelves.
+@pytest.mark.parametrize("generator", ["offices", "shelves"])
+def test_no_map_is_all_free(generator):
+    # Of so many small maps some have room for neither walls nor shelves.
     for seed in range(200):
-        free = MAP_GENERATORS[family](np.random.default_rng(seed), MIN_SIDE, MIN_SIDE)
+        free = MAP_GENERATORS[generator](np.random.default_rng(seed), MIN_SIZE, MIN_SIZE)
         assert 0.35 < free.mean() < 0.995
 
 
-@pytest.mark.parametrize("family", FOLLOWING)
+@pytest.mark.parametrize("generator", FOLLOWING)
 @pytest.mark.parametrize(("width", "height"), SIZES)
-def test_families_at_every_size(family, width, height):
+def test_generators_at_every_size(generator, width, height):
     for seed in range(6):
-        free = checked(family, seed, width, height)
+        free = generate_checked(generator, seed, width, height)
         assert 0.4 < free.mean() < 0.95
         # No part of the map has been walled off and filled.
         for part in (*np.array_split(free, 3, axis=0), *np.array_split(free, 3, axis=1)):
             assert part.mean() > 0.25
 
 
-@pytest.mark.parametrize("family", MAP_GENERATORS)
-def test_families_are_random_and_reproducible(family):
-    draw = MAP_GENERATORS[family]
-    first = draw(np.random.default_rng(1), 96, 96)
-    np.testing.assert_array_equal(first, draw(np.random.default_rng(1), 96, 96))
-    assert (first != draw(np.random.default_rng(2), 96, 96)).any()
+@pytest.mark.parametrize("generator", MAP_GENERATORS)
+def test_generators_are_random_and_reproducible(generator):
+    generate = MAP_GENERATORS[generator]
+    first = generate(np.random.default_rng(1), 96, 96)
+    np.testing.assert_array_equal(first, generate(np.random.default_rng(1), 96, 96))
+    assert (first != generate(np.random.default_rng(2), 96, 96)).any()
 
 
-@pytest.mark.parametrize("side", [MIN_SIDE, 64, 100])
-def test_world_maps(side):
+@pytest.mark.parametrize("size", [MIN_SIZE, 64, 100])
+def test_randomized_maps(size):
     seen = set()
     for seed in range(40):
-        free = randomized_map(np.random.default_rng(seed), side, tuple(MAP_GENERATORS))
-        assert free.shape == (side, side)
+        free = randomized_map(np.random.default_rng(seed), size, tuple(MAP_GENERATORS))
+        assert free.shape == (size, size)
         assert free.dtype == np.bool_
         assert 0.12 <= free.mean() < 1
         assert GridMap(free).components.max() == 1
         seen.add(free.tobytes())
-        again = randomized_map(np.random.default_rng(seed), side, tuple(MAP_GENERATORS))
+        again = randomized_map(np.random.default_rng(seed), size, tuple(MAP_GENERATORS))
         np.testing.assert_array_equal(free, again)
     assert len(seen) == 40
 
 
-@pytest.mark.parametrize("family", MAP_GENERATORS)
-def test_world_maps_of_one_family(family):
-    free = randomized_map(np.random.default_rng(0), 64, (family,))
+@pytest.mark.parametrize("generator", MAP_GENERATORS)
+def test_randomized_maps_of_one_generator(generator):
+    free = randomized_map(np.random.default_rng(0), 64, (generator,))
     assert free.shape == (64, 64)
 
 
@@ -117,35 +117,35 @@ def test_narrow_passage_is_narrow(seed):
     free = narrow_passage(np.random.default_rng(seed), 256, 256)
     gap = free.sum(axis=0).min()
     assert 4 <= gap <= 6
-    # With the passage shut the two sides are apart.
+    # With the passage closed the two sides are apart.
     free[:, free.sum(axis=0).argmin()] = False
     assert GridMap(free).components.max() >= 2
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_bug_trap_is_left_by_its_mouth_only(seed):
+def test_bug_trap_has_no_exit_but_its_mouth(seed):
     free = bug_trap(np.random.default_rng(seed), 256, 256)
     middle = 128
     outside = np.flatnonzero(free[:, 0])[0]
-    assert not free[middle, 150:220].all()  # the body is shut on the right
+    assert not free[middle, 150:220].all()  # the body is closed on the right
 
-    def shuts_the_trap(column):
-        """Whether a short wall somewhere across the channel parts the middle from the outside."""
-        shut = free.copy()
-        shut[90:166, column] = False
-        labels = GridMap(shut).components
+    def closes_the_trap(column):
+        """Return whether a short wall across the channel separates the middle from the outside."""
+        closed = free.copy()
+        closed[90:166, column] = False
+        labels = GridMap(closed).components
         return labels[middle, 150] not in (0, labels[outside, 0])
 
-    assert any(shuts_the_trap(column) for column in range(50, 110))
+    assert any(closes_the_trap(column) for column in range(50, 110))
 
 
-@pytest.mark.parametrize("family", MAP_GENERATORS)
-def test_families_refuse_small_maps(family):
-    with pytest.raises(ConfigError, match=f"from {MIN_SIDE} pixels a side up, got 40 x 100"):
-        MAP_GENERATORS[family](np.random.default_rng(0), 40, 100)
+@pytest.mark.parametrize("generator", MAP_GENERATORS)
+def test_generators_raise_for_small_maps(generator):
+    with pytest.raises(ConfigError, match=f"from {MIN_SIZE} pixels a side up, got 40 x 100"):
+        MAP_GENERATORS[generator](np.random.default_rng(0), 40, 100)
 
 
-def test_bundled_maps_are_what_the_script_draws(script):
+def test_bundled_maps_are_what_the_script_generates(script):
     assert set(bundled_maps()) == set(script.TASKS) < set(MAP_GENERATORS)
     for name in bundled_maps():
         np.testing.assert_array_equal(GridMap.load(f"bundled:{name}").free, script.draw(name))

@@ -19,7 +19,7 @@ STUDIES = Path(__file__).resolve().parents[2] / "benchmarks" / "studies"
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("set") / "set"
-    settings = GenerationSettings(maps=30, tasks=2, copies=10, runs=2, families=("clutter",))
+    settings = GenerationSettings(maps=30, tasks=2, copies=10, runs=2, generators=("clutter",))
     generate(root, settings, jobs=1, resume=False, progress=False)
     # All tasks are for testing, so that every original has some.
     rows = [(root / f"{name}.csv").read_text().splitlines() for name in ("train", "test")]

@@ -78,11 +78,11 @@ def test_generator_loss_weights() -> None:
     assert losses.generator_loss(*parts).item() == pytest.approx(0.5 * 3 + 20 * 0.2 + 7)
 
 
-def test_adaptive_shares_follow_the_errors_of_the_discriminators() -> None:
-    assert losses.adaptive_shares(0.2, 0.4, alpha=3.0) == pytest.approx((0.6, 0.4))
-    assert losses.adaptive_shares(0.5, 0.5, alpha=1.0) == pytest.approx((0.5, 0.5))
+def test_adaptive_weights_follow_the_errors_of_the_discriminators() -> None:
+    assert losses.adaptive_weights(0.2, 0.4, alpha=3.0) == pytest.approx((0.6, 0.4))
+    assert losses.adaptive_weights(0.5, 0.5, alpha=1.0) == pytest.approx((0.5, 0.5))
 
 
-def test_adaptive_shares_of_discriminators_without_error() -> None:
-    assert losses.adaptive_shares(0.0, 0.0, alpha=3.0) == pytest.approx((0.75, 0.25))
-    assert losses.adaptive_shares(0.0, 0.1, alpha=3.0) == (0, 1)
+def test_adaptive_weights_of_discriminators_without_error() -> None:
+    assert losses.adaptive_weights(0.0, 0.0, alpha=3.0) == pytest.approx((0.75, 0.25))
+    assert losses.adaptive_weights(0.0, 0.1, alpha=3.0) == (0, 1)

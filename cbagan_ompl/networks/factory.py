@@ -1,0 +1,39 @@
+"""The networks that a configuration asks for, with fresh weights from torch's random numbers."""
+
+from __future__ import annotations
+
+from .attention import Attention
+from .config import NetworkConfig
+from .discriminator import Discriminator
+from .generator import Generator
+from .patch_generator import PatchGenerator
+
+
+def make_generator(config: NetworkConfig) -> Generator | PatchGenerator:
+    """Return the generator of a configuration.
+
+    Example:
+        >>> make_generator(NetworkConfig(patch=4, widths=(8, 8, 16))).stride
+        32
+    """
+    attention = attention_of(config)
+    if config.patch == 1:
+        return Generator(config.widths, attention, config.stem, config.noise_stem)
+    return PatchGenerator(
+        config.widths,
+        attention,
+        config.stem,
+        config.patch,
+        config.cost_maps,
+        config.white_obstacles,
+    )
+
+
+def make_discriminator(config: NetworkConfig) -> Discriminator:
+    """Return a discriminator of a configuration: the map's and the points' have the same form."""
+    return Discriminator(config.discriminator_width, attention_of(config), config.patch)
+
+
+def attention_of(config: NetworkConfig) -> Attention:
+    """Return the kinds of attention that a configuration asks for, in all three networks."""
+    return Attention(config.channel_attention, config.spatial_attention, config.self_attention)

@@ -1,0 +1,115 @@
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.synthetic import TINY_PATCHES
+from helpers.training_set import write_training_set
+
+pytest.importorskip("torch")
+
+from cbagan_ompl import ConfigError, DatasetError, GridMap
+from cbagan_ompl.cli.train import add_export_parser, add_train_parser
+from cbagan_ompl.inference.predictor import load_model
+from cbagan_ompl.training.checkpoints import load_checkpoint
+from cbagan_ompl.training.export import export
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_training_set(tmp_path_factory.mktemp("data") / "tiny")
+
+
+def run(*words: str) -> int:
+    parser = argparse.ArgumentParser()
+    commands = parser.add_subparsers()
+    add_train_parser(commands)
+    add_export_parser(commands)
+    args = parser.parse_args(words)
+    return int(args.run(args))
+
+
+def test_train_and_export_commands(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recipe = tmp_path / "recipe.yaml"
+    recipe.write_text("widths: [4, 4, 6, 8]\nbatch_size: 8\n")
+    words = ["train", str(folder), "--output", str(tmp_path / "run"), "--config", str(recipe)]
+    words += ["--set", "discriminator_width=4", "batch_size=4", "--epochs", "1"]
+    words += ["--device", "cpu", "--json", str(tmp_path / "scores.json")]
+    assert run(*words) == 0
+    assert "straight line" in capsys.readouterr().out
+    assert 0 <= json.loads((tmp_path / "scores.json").read_text())["test"]["iou"] <= 1
+    state = load_checkpoint(tmp_path / "run" / "best.pt")
+    assert (state["config"]["batch_size"], state["config"]["epochs"]) == (4, 1)
+
+    words = ["export", str(tmp_path / "run/best.pt"), "--output", str(tmp_path / "tiny.pt")]
+    assert run(*words) == 0
+    assert {"tiny.pt", "tiny.md", "manifest.json"} <= {p.name for p in tmp_path.iterdir()}
+
+
+@pytest.mark.parametrize("words", [["--set", "epochs"], ["--set", "epoch=1"], ["--threads", "0"]])
+def test_bad_train_options(folder: Path, tmp_path: Path, words: list[str]) -> None:
+    with pytest.raises(ConfigError):
+        run("train", str(folder), "--output", str(tmp_path), *words)
+
+
+def test_train_and_export_on_synthetic_maps(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recipe = tmp_path / "recipe.json"
+    recipe.write_text(json.dumps(TINY_PATCHES.updated({"epochs": 1}).to_dict()))
+    words = ["--size", "64", "--maps", "2", "--held-out", "1", "--generators", "blocks,caves"]
+    words += ["--hard-fraction", "0.5", "--synthetic-seed", "7", "--config", str(recipe)]
+    words += ["--device", "cpu", "--output", str(tmp_path / "run")]
+    assert run("train", "--synthetic", *words) == 0
+    assert "16 training tasks an epoch, 8 for testing" in capsys.readouterr().out
+    record = export(tmp_path / "run" / "best.pt", tmp_path / "synthetic.pt")
+    assert record["working_size"] == 64
+    assert record["dataset"]["synthetic"]["generators"] == ["blocks", "caves"]
+    assert record["dataset"]["synthetic"]["hard_fraction"] == 0.5
+    assert "2 new maps of 64 x 64" in (tmp_path / "synthetic.md").read_text()
+    grid = GridMap(np.ones((100, 70)))
+    assert load_model(tmp_path / "synthetic.pt").predict(grid, (5, 5), (60, 90)).region.any()
+
+
+@pytest.mark.parametrize(
+    ("words", "error", "message"),
+    [
+        (["set", "--synthetic"], ConfigError, "give one of both"),
+        ([], ConfigError, "give one of both"),
+        (["--synthetic", "--size", "72"], DatasetError, "a multiple of 16 pixels; these have 72"),
+        (
+            ["--synthetic", "--size", "96", "--set", "patch=4"],
+            DatasetError,
+            "a multiple of 64 pixels; these have 96",
+        ),
+        (
+            ["--synthetic", "--generators", "castles"],
+            ConfigError,
+            "'castles'; there are blocked_cells",
+        ),
+        (
+            ["--synthetic", "--preset", "synthetic", "--size", "64"],
+            DatasetError,
+            "discriminators take images of at least 128 pixels; these have 64",
+        ),
+        (["--synthetic", "--maps", "0"], ConfigError, "maps must be at least 1"),
+        (["--synthetic", "--hard-fraction", "2"], ConfigError, "hard_fraction"),
+    ],
+)
+def test_bad_options_are_reported_before_any_map_is_generated(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    words: list[str],
+    error: type[Exception],
+    message: str,
+) -> None:
+    # Whatever generates maps fails.
+    monkeypatch.setattr("cbagan_ompl.training.task_sources.ProcessPoolExecutor", None)
+    with pytest.raises(error, match=message):
+        run("train", *words, "--output", str(tmp_path / "run"))
+    assert not (tmp_path / "run").exists()

@@ -1,0 +1,49 @@
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("numba")
+
+from cbagan_ompl.datasets.geodesic import distance_field
+from cbagan_ompl.datasets.geodesic_labels import EPSILON, SLACK, geodesic_label
+from cbagan_ompl.maps.connectivity import connects
+from cbagan_ompl.sampling.heatmap import REGION_THRESHOLD
+
+
+def label_of(
+    free: np.ndarray[Any, Any], start: tuple[int, int], goal: tuple[int, int]
+) -> np.ndarray[Any, Any]:
+    return geodesic_label(distance_field(free, start), distance_field(free, goal), goal)
+
+
+def test_labels_are_one_on_the_shortest_path_and_a_half_at_the_border() -> None:
+    detour = EPSILON * 100 + SLACK
+    # The start, a point on the path, the goal, one behind it, one on the border, and an obstacle.
+    from_start = np.array([[0, 40, 100, 103, 50, np.inf]], np.float32)
+    from_goal = np.array([[100, 60, 0, 3, 50 + detour, np.inf]], np.float32)
+    label = geodesic_label(from_start, from_goal, (2, 0))[0]
+    assert label.tolist() == pytest.approx([1, 1, 1, 2 ** (-6 / detour), 0.5, 0])
+
+
+def test_labels_connect_the_endpoints_through_free_space() -> None:
+    free = np.ones((80, 100), np.bool_)
+    free[:60, 50:53] = False
+    label = label_of(free, (20, 20), (80, 20))
+    assert label.max() <= 1
+    assert label[20, 20] == pytest.approx(1, abs=0.02)
+    assert (label[~free] == 0).all()
+    assert connects(label >= REGION_THRESHOLD, (20, 20), (80, 20), connectivity=8)
+    assert label[70, 99] < 0.01
+
+
+def test_labels_keep_both_of_two_paths_of_equal_length() -> None:
+    free = np.ones((61, 100), np.bool_)
+    free[20:41, 30:70] = False
+    region = label_of(free, (10, 30), (90, 30)) >= REGION_THRESHOLD
+    for half in (slice(0, 31), slice(31, 61)):
+        one = region.copy()
+        one[half, 30:70] = False
+        assert connects(one, (10, 30), (90, 30), connectivity=8)
