@@ -3,8 +3,8 @@
     python benchmarks/studies/labels.py --maps 16 --json benchmarks/results/labels.json
 
 A network can at best predict the labels that it is trained on. Here planners sample the labels
-themselves: the exact ones of several widths (EPSILON of cbagan_ompl.datasets.geodesic_labels), and the
-paper's, the union of 50 runs of RRT. Ratios are to OMPL's own sampler, geometric means over the
+themselves: the exact ones of several widths (EPSILON of cbagan_ompl.datasets.geodesic_labels), and
+the paper's, the union of 50 runs of RRT. Ratios are to OMPL's own sampler, geometric means over the
 tasks.
 """
 
