@@ -3,6 +3,7 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Iterator
+from pathlib import Path
 
 # Before torch is loaded: on small tensors several threads mostly wait for each other, and on a
 # busy machine for minutes.
@@ -10,6 +11,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 import pytest
+from helpers.benchmarks import Finished, run_benchmark_of_walls, write_map
 from helpers.tasks import GOAL, START
 
 from cbagan_ompl import GridMap, Heatmap
@@ -27,6 +29,18 @@ def two_walls() -> GridMap:
 @pytest.fixture(scope="session")
 def corridor(two_walls: GridMap) -> Heatmap:
     return Heatmap.corridor(two_walls, START, GOAL)
+
+
+@pytest.fixture(scope="session")
+def map_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("maps")
+    write_map(folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def finished(map_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Finished:
+    return run_benchmark_of_walls(map_folder, tmp_path_factory.mktemp("benchmark") / "out")
 
 
 @pytest.fixture

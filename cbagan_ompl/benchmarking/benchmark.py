@@ -1,16 +1,17 @@
-"""A whole benchmark: its folder, its tasks, and what is made of their logs."""
+"""A whole benchmark: its folder, its tasks, and the results that are made of their logs."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from ..common.files import make_folder, write_atomically, write_json
 from ..errors import ConfigError
 from .database import write_database
 from .logs import parse_log
+from .measures import thresholds
 from .plots import save_plots
-from .report import Circumstances, markdown, summary_json
+from .report import Conditions, markdown, summary_json
 from .runner import run_jobs
 from .settings import Settings
 from .statistics import results_of
@@ -27,14 +28,14 @@ class Benchmark:
         folder: where the results go.
 
     Args:
-        tasks: to be run.
+        tasks: the tasks to be run.
         settings: what is compared on them.
-        folder: made if need be.
-        resume: go on with the tasks that have no log yet.
+        folder: folder of the results; made where it is missing.
+        resume: continue with the tasks that have no log yet.
 
     Raises:
-        ConfigError: the folder holds a benchmark that is not to be gone on with, or another one;
-            or an option that makes no sense.
+        ConfigError: the folder holds a benchmark and ``resume`` is off, or one with other
+            settings; or it cannot be made; or an option that makes no sense.
         PlannerError: an unknown planner, or one that no hook reaches on this OMPL.
         ModelError: an unusable model file.
         HeatmapError: a task without a heat map where there should be one.
@@ -57,19 +58,16 @@ class Benchmark:
                 f"{folder} holds a benchmark with other options, see {saved.name}: give the same "
                 "ones, or choose another folder"
             )
-        try:
-            logs.mkdir(parents=True, exist_ok=True)
-            settings.save(saved)
-        except OSError as error:
-            raise ConfigError(f"cannot write to {folder}: {error.strerror or error}") from error
+        make_folder(logs)
+        settings.save(saved)
 
     def run(self, processes: int, show_progress: bool = True) -> dict[str, str]:
         """Run the tasks that have no log yet; arguments and result as for :func:`.run_jobs`."""
-        left = [job for job in self._jobs if not job.log.is_file()]
-        return run_jobs(left, processes, show_progress)
+        remaining = [job for job in self._jobs if not job.log.is_file()]
+        return run_jobs(remaining, processes, show_progress)
 
     def finished_logs(self) -> list[Path]:
-        """The logs of the tasks that have been run."""
+        """Return the logs of the tasks that have been run."""
         return [job.log for job in self._jobs if job.log.is_file()]
 
 
@@ -80,28 +78,28 @@ def write_results(
     folder: Path,
     command: str,
 ) -> str:
-    """Write database, summary and plots.
+    """Write the database, the summary and the plots.
 
     Args:
-        logs: at least one.
-        settings: of the benchmark.
-        failures: tasks that failed, with their last words.
+        logs: logs of the tasks, at least one.
+        settings: settings of the benchmark.
+        failures: for each task that failed the end of its output.
         folder: where to write.
-        command: that makes the same numbers again.
+        command: command that repeats the benchmark.
 
     Returns:
         The report in Markdown.
+
+    Raises:
+        ConfigError: a file cannot be written.
     """
     write_database(logs, folder / "benchmark.db")
     parsed = [parse_log(log.read_text(encoding="utf-8")) for log in logs]
-    results = results_of(parsed)
+    results = results_of(parsed, thresholds(settings.within))
     version = parsed[0].version.split()[-1]
-    circumstances = Circumstances(version, len(parsed), settings, failures, command)
-    summary = summary_json(results, circumstances)
-    (folder / "summary.json").write_text(
-        json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8"
-    )
-    report = markdown(results, circumstances)
-    (folder / "summary.md").write_text(report, encoding="utf-8")
-    save_plots(parsed, results, folder)
+    conditions = Conditions(version, len(parsed), settings, failures, command)
+    write_json(folder / "summary.json", summary_json(results, conditions))
+    report = markdown(results, conditions)
+    write_atomically(folder / "summary.md", report)
+    save_plots(parsed, results, settings.within, folder)
     return report

@@ -27,7 +27,7 @@ CREATE TABLE progress
     FOREIGN KEY (runid) REFERENCES runs(id) ON DELETE CASCADE);
 """
 
-# Which configurations of a planner come first in the overviews: those that solve most, fastest.
+# The best configuration of each planner: the one that solves most, then the fastest.
 _VIEWS = """
 CREATE VIEW bestPlannerConfigsPerExperiment AS
     SELECT plannerid, experimentid, MIN(avg_solved) AS avg_solved, avg_total_time
@@ -47,11 +47,11 @@ CREATE VIEW bestPlannerConfigs AS
 
 
 def write_database(logs: Sequence[Path], path: Path) -> None:
-    """Collect logs in a database, with OMPL's own script where the installed build has it.
+    """Write logs into a database, with OMPL's own script where the installed build has it.
 
     Args:
-        logs: files of :mod:`.logs`' format.
-        path: the database; one that is there is replaced.
+        logs: files in the format of :mod:`.logs`.
+        path: the database; an existing file is replaced.
     """
     from ..planning.compat import fill_statistics_database
 
@@ -61,11 +61,11 @@ def write_database(logs: Sequence[Path], path: Path) -> None:
 
 
 def write_tables(logs: Iterable[ExperimentLog], path: Path) -> None:
-    """Write what OMPL's ``ompl_benchmark_statistics`` writes, for builds that have none.
+    """Write the tables of OMPL's ``ompl_benchmark_statistics``, for builds without this script.
 
     Args:
         logs: the content of the database.
-        path: the file, which must not be there yet.
+        path: the file, which must not exist yet.
     """
     with closing(sqlite3.connect(path)) as database:
         database.executescript(_TABLES)
@@ -126,14 +126,14 @@ def _add_planner(database: sqlite3.Connection, experiment: int, planner: Planner
     columns = _add_columns(database, "progress", properties_of(points))
     for run, points_of_run in zip(runs, planner.progress, strict=False):
         for point in points_of_run:
-            # Two points of one time cannot be told apart, OMPL's script keeps the first as well.
+            # Of two points with the same time OMPL's script keeps the first one too.
             _insert(database, "progress", {"runid": run, **_values(point, columns)}, "OR IGNORE")
 
 
 def _add_columns(
     database: sqlite3.Connection, table: str, properties: Iterable[str], separator: str = "_"
 ) -> dict[str, str]:
-    """Make columns for properties, "graph states INTEGER"; their names by property."""
+    """Add columns for properties, "graph states INTEGER"; return their names by property."""
     present = {row[1] for row in database.execute(f"PRAGMA table_info({table})")}
     columns = {}
     for name in properties:
@@ -152,11 +152,12 @@ def _values(row: Mapping[str, str], columns: Mapping[str, str]) -> dict[str, str
 
 
 def _insert(
-    database: sqlite3.Connection, table: str, row: Mapping[str, object], otherwise: str = ""
+    database: sqlite3.Connection, table: str, row: Mapping[str, object], conflict: str = ""
 ) -> int:
-    places = ", ".join("?" * len(row))
+    """Insert a row and return its id."""
+    marks = ", ".join("?" * len(row))
     cursor = database.execute(
-        f"INSERT {otherwise} INTO {table} ({', '.join(row)}) VALUES ({places})", list(row.values())
+        f"INSERT {conflict} INTO {table} ({', '.join(row)}) VALUES ({marks})", list(row.values())
     )
     assert cursor.lastrowid is not None, "an INSERT has a last row"
     return cursor.lastrowid

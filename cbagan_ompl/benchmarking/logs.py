@@ -1,6 +1,7 @@
-"""OMPL's benchmark logs: reading, joining, adding to and writing them.
+"""OMPL's benchmark logs: reading, concatenating and writing them.
 
-The format is that of OMPL's documentation of Benchmark. What is not understood of it is kept.
+The format is that of `OMPL's documentation of Benchmark
+<https://ompl.kavrakilab.org/benchmark.html>`_. Properties that this package does not know are kept.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from ..errors import ConfigError
 
 _BLOCK_BEGIN, _BLOCK_END = "<<<|", "|>>>"
 
-#: The name by which OMPL's logs call a geometric planner begins with this.
+#: OMPL's logs put this before the name of a geometric planner.
 GEOMETRIC = "geometric_"
 
 
@@ -24,12 +25,12 @@ class PlannerLog:
     """The runs of one planner.
 
     Attributes:
-        name: what the planner is called.
+        name: name of the planner, with OMPL's prefix.
         settings: lines ``parameter = value``.
-        runs: for each run its properties, ``"graph states INTEGER"`` -> text; a property that a
-            run lacks is missing or empty.
-        progress: for each run its points in time, each a property -> text; empty where the
-            planner has none.
+        runs: the properties of each run, ``"graph states INTEGER"`` -> text; a property that a run
+            does not have is missing or empty.
+        progress: the progress data of each run: points in time, each a property -> text; empty
+            for a planner without such data.
     """
 
     name: str
@@ -40,23 +41,23 @@ class PlannerLog:
 
 @dataclass(frozen=True)
 class ExperimentLog:
-    """One log.
+    """The log of one experiment: the runs of all planners on one problem.
 
     Attributes:
         version: ``"OMPL version 2.0.1"``.
-        name: of the experiment, without blanks.
-        parameters: of the experiment, ``"map VARCHAR"`` -> text.
+        name: name of the experiment, without blanks.
+        parameters: properties of the experiment, ``"map VARCHAR"`` -> text.
         host: name of the machine.
-        date: when it began.
+        date: time at which the experiment began.
         setup: OMPL's description of the problem.
-        cpu: OMPL's description of the machine, empty where it has none.
-        seed: of OMPL's generators.
-        time_limit: seconds of a run.
-        memory_limit: megabytes of a run.
-        runs: of each planner.
-        total_time: seconds.
+        cpu: OMPL's description of the processor, empty where it gives none.
+        seed: seed of OMPL's generators.
+        time_limit: of a run, seconds.
+        memory_limit: of a run, megabytes.
+        runs: number of runs of each planner.
+        total_time: of the experiment, seconds.
         enums: name and values of each enumeration.
-        planners: in the order in which they ran.
+        planners: the planners, in the order in which they ran.
     """
 
     version: str
@@ -76,10 +77,10 @@ class ExperimentLog:
 
 
 def parse_log(text: str) -> ExperimentLog:
-    """Read a log that OMPL's ``Benchmark.saveResultsToFile`` or :func:`format_log` wrote.
+    """Return the content of a log that OMPL's Benchmark or :func:`format_log` wrote.
 
     Raises:
-        ConfigError: the text is no such log, or not a whole one.
+        ConfigError: the text is no such log, or is cut off.
     """
     lines = _Lines(text)
     try:
@@ -112,20 +113,21 @@ def parse_log(text: str) -> ExperimentLog:
 
 
 class _Lines:
-    """The lines of a log, one after the other."""
+    """The lines of a log, read one after the other."""
 
     def __init__(self, text: str) -> None:
         self._lines = text.splitlines()
         self.number = 0
 
     def next(self) -> str:
+        """Return the next line."""
         if self.number == len(self._lines):
             raise ValueError("the text ends here")
         self.number += 1
         return self._lines[self.number - 1]
 
     def match(self, pattern: str, default: str | None = None) -> str:
-        """What the group of the pattern matches in the next line, or ``default`` without it."""
+        """Return what the pattern's group matches in the next line, or ``default`` if none does."""
         found = re.fullmatch(pattern, self.next())
         if found:
             return found[1]
@@ -135,13 +137,13 @@ class _Lines:
         return default
 
     def block(self) -> str:
-        """The text of an optional block of lines."""
+        """Return the text of an optional block of lines."""
         if not self.match(f"({re.escape(_BLOCK_BEGIN)})", ""):
             return ""
         return "\n".join(iter(self.next, _BLOCK_END))
 
     def several(self, count_pattern: str, default: str | None = None) -> tuple[str, ...]:
-        """As many lines as the next line says."""
+        """Return as many lines as the next line announces."""
         return tuple(self.next() for _ in range(int(self.match(count_pattern, default))))
 
 
@@ -166,11 +168,11 @@ def _parse_planner(lines: _Lines) -> PlannerLog:
     return PlannerLog(name, settings, runs, progress)
 
 
-def join_logs(logs: Sequence[ExperimentLog]) -> ExperimentLog:
-    """The log that OMPL would have written had it done the runs of several logs in one go.
+def concatenate_logs(logs: Sequence[ExperimentLog]) -> ExperimentLog:
+    """Return the log of the runs of several logs, as OMPL would have written it for all at once.
 
     Args:
-        logs: of the same problem with the same planners, in the order of the runs.
+        logs: logs of the same problem and the same planners, in the order of the runs.
     """
     first = logs[0]
     return replace(
@@ -189,7 +191,7 @@ def join_logs(logs: Sequence[ExperimentLog]) -> ExperimentLog:
 
 
 def format_log(log: ExperimentLog) -> str:
-    """The text of a log, as OMPL writes it."""
+    """Return the text of a log, as OMPL writes it; :func:`parse_log` reads it back."""
     lines = [
         log.version,
         f"Experiment {log.name}",
@@ -207,12 +209,12 @@ def format_log(log: ExperimentLog) -> str:
         f"{len(log.enums)} enum type{'' if len(log.enums) == 1 else 's'}",
         *("|".join(enum) for enum in log.enums),
         f"{len(log.planners)} planners",
-        *chain.from_iterable(_planner_lines(planner) for planner in log.planners),
+        *chain.from_iterable(_format_planner(planner) for planner in log.planners),
     ]
     return "\n".join(lines) + "\n"
 
 
-def _planner_lines(planner: PlannerLog) -> Iterator[str]:
+def _format_planner(planner: PlannerLog) -> Iterator[str]:
     properties = properties_of(planner.runs)
     yield planner.name
     yield f"{len(planner.settings)} common properties"
@@ -236,11 +238,11 @@ def _planner_lines(planner: PlannerLog) -> Iterator[str]:
 
 
 def properties_of(rows: Iterable[Mapping[str, str]]) -> list[str]:
-    """Names of all properties of some runs or points, sorted."""
+    """Return the names of all properties of some runs or points in time, sorted."""
     return sorted(set(chain.from_iterable(rows)))
 
 
 def number(text: str | None) -> float | None:
-    """A finite number of a log, None where it has none."""
+    """Return a number of a log, None where it is missing or infinite."""
     value = float(text) if text else inf
     return value if isfinite(value) else None

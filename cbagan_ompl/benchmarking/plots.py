@@ -1,274 +1,291 @@
-"""Plots of a benchmark, for colour-blind readers and for print in black and white."""
+"""The plots of a benchmark: success, cost over time, first paths, nodes, ratios to OMPL's own."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import cycle
 from math import inf
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 from numpy.typing import NDArray
 
+from ..common.figures import write_figure
 from .logs import GEOMETRIC, ExperimentLog, number
 from .measures import BEST_KNOWN, INFERENCE, NODES, logged_costs
+from .plot_styles import Panels, Style, legend_handles, styles_of
 from .settings import BASELINE
-from .statistics import Interval, Results
+from .statistics import Results, Summary, within_key
 
 _DOTS_PER_INCH = 200
-_PANEL_WIDTH, _PANEL_HEIGHT, _LEGEND_WIDTH, _LEGEND_HEIGHT = 3.2, 2.7, 1.7, 0.45
-_ROW_HEIGHT = 0.32
-_MOST_COLUMNS = 3
-_TIMES = 200
+_HEIGHT = 2.7  # of a panel, inches
+_RATIO_HEIGHT, _RATIO_ROW_HEIGHT = 0.9, 0.32
+_TIMES = 400  # points of a curve of costs
 
-
-@dataclass(frozen=True)
-class _Style:
-    """How a sampler is drawn: a colour of Okabe and Ito's, and what tells it apart in grey."""
-
-    color: str
-    dashes: tuple[int, ...]
-    marker: str
-    hatch: str
-
-    @property
-    def line(self) -> Any:
-        """What matplotlib takes as a line style."""
-        return (0, self.dashes) if self.dashes else "-"
-
-
-_STYLES = (
-    _Style("#000000", (4, 2), "s", ""),
-    _Style("#0072B2", (), "o", "////"),
-    _Style("#009E73", (5, 1, 1, 1), "^", "...."),
-    _Style("#E69F00", (1, 1), "D", "xxxx"),
-    _Style("#CC79A7", (3, 1, 1, 1, 1, 1), "v", "||||"),
-    _Style("#D55E00", (7, 2), "P", "----"),
-    _Style("#56B4E9", (2, 2), "X", "++++"),
-)
+# Costs are drawn on a logarithmic axis, those nearer to the best known one at its lower end.
+_LEAST_EXCESS = 0.1
 
 
 @dataclass(frozen=True)
 class _Run:
-    """What is drawn of a run; times in seconds with inference, costs of the best known one."""
+    """What is drawn of a run.
+
+    Attributes:
+        costs: each better solution, (seconds with inference, cost in multiples of the best known).
+        limit: time limit, seconds.
+        nodes: states of the tree or roadmap.
+    """
 
     costs: list[tuple[float, float]]
     limit: float
     nodes: float
 
+    @property
+    def first_solution(self) -> float:
+        """Time of the first path, the limit for a run without one, seconds."""
+        return self.costs[0][0] if self.costs else self.limit
 
+
+# Planner -> sampler -> runs.
 _Runs = dict[str, dict[str, list[_Run]]]
 
 
-def save_plots(logs: Sequence[ExperimentLog], results: Results, folder: Path) -> None:
+def save_plots(logs: Sequence[ExperimentLog], results: Results, within: int, folder: Path) -> None:
     """Draw the plots of a benchmark, each as ``.png`` and as ``.pdf``.
 
+    A planner that has nothing to show in a plot is left out of it, and so is a plot without
+    planners: the cost over time of planners that stop at their first path, and the time to a good
+    path where neither the sampler nor OMPL's own gets there.
+
     Args:
-        logs: of its tasks.
-        results: what they amount to.
-        folder: where to save them.
+        logs: logs of the tasks.
+        results: the statistics of the logs.
+        within: threshold of a good path, percent above the best known cost.
+        folder: where to save the plots.
+
+    Raises:
+        ConfigError: a plot cannot be written.
     """
-    runs = _runs(logs)
+    runs = _collect_runs(logs)
+    improving = {name: some for name, some in runs.items() if _any_improves(some)}
+    good_paths = f"time to {within} % of the best known cost"
     figures = {
-        "success": _curves(runs, _draw_success, "share of runs solved"),
-        "cost": _curves(runs, _draw_cost, "cost / best known, quartiles"),
-        "first_solution": _boxes(runs, _first_solution, "first solution with inference, s"),
-        "nodes": _boxes(runs, _nodes, "nodes"),
+        "success": _success_figure(runs),
+        "cost": _cost_figure(improving, within) if improving else None,
+        "first_solution": _boxes_figure(
+            runs, lambda run: run.first_solution, "first path with inference, s"
+        ),
+        "nodes": _boxes_figure(runs, lambda run: run.nodes, "nodes"),
+        "ratio_first_solution": _ratio_figure(
+            results, "first_solution_total_s", "time to the first path"
+        ),
+        f"ratio_within_{within}_percent": _ratio_figure(
+            results, within_key(within, total=True), good_paths
+        ),
     }
-    if any(BASELINE in samplers and len(samplers) > 1 for samplers in runs.values()):
-        for measure, label in (
-            ("first_solution", "time to first solution"),
-            ("within_2_percent", "time to 2 % of the best known cost"),
-        ):
-            figures[f"ratio_{measure}"] = _ratios(results, runs, f"{measure}_total_s", label)
     for name, figure in figures.items():
         for suffix in (".png", ".pdf"):
-            figure.savefig(folder / f"{name}{suffix}", dpi=_DOTS_PER_INCH)
+            path = folder / f"{name}{suffix}"
+            if figure is None:
+                path.unlink(missing_ok=True)  # of an earlier run of the same benchmark
+            else:
+                write_figure(figure, path, _DOTS_PER_INCH)
 
 
-def _runs(logs: Sequence[ExperimentLog]) -> _Runs:
+def _collect_runs(logs: Sequence[ExperimentLog]) -> _Runs:
     runs: _Runs = {}
     for log in logs:
         best = number(log.parameters.get(BEST_KNOWN)) or inf
         for planner in log.planners:
             name, sampler = planner.name.removeprefix(GEOMETRIC).split("_", 1)
-            drawn = runs.setdefault(name, {}).setdefault(sampler, [])
+            collected = runs.setdefault(name, {}).setdefault(sampler, [])
             for i, run in enumerate(planner.runs):
                 inference = float(run[INFERENCE])
                 points = planner.progress[i] if planner.progress else ()
                 costs = [(t + inference, c / best) for t, c in logged_costs(run, points)]
-                drawn.append(_Run(costs, log.time_limit, float(run[NODES])))
+                collected.append(_Run(costs, log.time_limit, float(run[NODES])))
     return runs
 
 
-def _styles(runs: _Runs) -> dict[str, _Style]:
-    """A style for each sampler, the first one for the baseline."""
+def _any_improves(by_sampler: Mapping[str, Sequence[_Run]]) -> bool:
+    """Return whether a planner has found a path that is better than its first one."""
+    return any(len(run.costs) > 1 for runs in by_sampler.values() for run in runs)
+
+
+def _styles(runs: _Runs) -> dict[str, Style]:
     samplers = dict.fromkeys(sampler for by_sampler in runs.values() for sampler in by_sampler)
-    others = [sampler for sampler in samplers if sampler != BASELINE]
-    styles = dict(zip(others, cycle(_STYLES[1:]), strict=False))
-    return {sampler: styles.get(sampler, _STYLES[0]) for sampler in samplers}
+    return styles_of(samplers)
 
 
-_Draw = Callable[[Axes, list[_Run], _Style], None]
-
-
-def _curves(runs: _Runs, draw: _Draw, label: str) -> Figure:
-    """A panel for each planner, a curve over time for each sampler."""
-    styles = _styles(runs)
-    # The costs of planners that stop at their first solution would dwarf those of the others.
-    figure, panels = _figure(list(runs), _PANEL_HEIGHT, share_y=draw is not _draw_cost)
-    panels[0].set_ylabel(label)
-    for axes, by_sampler in zip(panels, runs.values(), strict=True):
+def _success_figure(runs: _Runs) -> Figure:
+    """Draw for each planner the fraction of the runs that have a path, over time."""
+    panels, styles = Panels(list(runs), _HEIGHT), _styles(runs)
+    begin = min(run.first_solution for some in runs.values() for r in some.values() for run in r)
+    for axes, by_sampler in zip(panels.axes, runs.values(), strict=True):
         for sampler, of_sampler in by_sampler.items():
-            draw(axes, of_sampler, styles[sampler])
-        axes.grid(color="0.9", linewidth=0.6)
-        axes.set_xscale("log")
-        axes.set_xlabel("planning and inference, s")
-        _plain_numbers(axes)
-    handles = [
-        Line2D([], [], color=style.color, linestyle=style.line, linewidth=1.8, label=sampler)
-        for sampler, style in styles.items()
-    ]
-    _add_legend(figure, handles)
-    return figure
+            times = sorted(run.costs[0][0] for run in of_sampler if run.costs)
+            fractions = np.arange(len(times) + 1) / len(of_sampler)
+            x = [begin, *times, max(_end(of_sampler), *times, begin)]
+            line = styles[sampler].line
+            axes.step(x, [*fractions, fractions[-1]], where="post", **line)
+        axes.grid(axis="y", color="0.9", linewidth=0.6)
+        axes.set_ylim(-0.03, 1.03)
+    panels.use_logarithm("x")
+    panels.label(x="planning and inference, s", y="fraction of runs with a path")
+    panels.add_legend(legend_handles(styles))
+    return panels.figure
 
 
-def _figure(
-    planners: Sequence[str], height: float, share_y: bool = True
-) -> tuple[Figure, list[Axes]]:
-    """Empty panels, one for each planner."""
-    columns = min(len(planners), _MOST_COLUMNS)
-    rows = -(-len(planners) // columns)
-    size = (_PANEL_WIDTH * columns + 0.6, height * rows + _LEGEND_HEIGHT)
-    figure = Figure(figsize=size, layout="constrained")
-    places = figure.subplots(rows, columns, sharex=True, sharey=share_y, squeeze=False).ravel()
-    for unused in places[len(planners) :]:
-        unused.set_axis_off()
-    panels: list[Axes] = places[: len(planners)].tolist()
-    for axes, planner in zip(panels, planners, strict=True):
-        axes.set_title(planner, fontsize=10)
-        axes.set_axisbelow(True)
-        axes.tick_params(labelbottom=True)
-    return figure, panels
+def _cost_figure(runs: _Runs, within: int) -> Figure:
+    """Draw for each planner the median cost over time and its quartiles."""
+    panels, styles = Panels(list(runs), _HEIGHT), _styles(runs)
+    for axes, by_sampler in zip(panels.axes, runs.values(), strict=True):
+        for sampler, of_sampler in by_sampler.items():
+            _draw_cost(axes, of_sampler, styles[sampler])
+        axes.axhline(within, color="0.4", linewidth=0.8)
+        axes.text(
+            0.01, within, f"{within} %", transform=axes.get_yaxis_transform(), va="bottom", size=7
+        )
+    panels.use_logarithm("x")
+    panels.use_logarithm("y")
+    panels.label(
+        x="planning and inference, s", y="cost above the best known, %\nmedian and quartiles"
+    )
+    panels.add_legend(legend_handles(styles))
+    return panels.figure
 
 
-def _add_legend(figure: Figure, handles: Sequence[Line2D]) -> None:
-    """Below all panels, as many entries beside each other as there is room for."""
-    columns = int(figure.get_figwidth() // _LEGEND_WIDTH)
-    figure.legend(handles=handles, loc="outside lower center", ncols=columns, frameon=False)
-
-
-def _plain_numbers(axes: Axes) -> None:
-    """On a logarithmic x axis: 0.03 rather than a power of ten."""
-    axes.xaxis.set_major_locator(LogLocator(subs=(1, 3)))
-    axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.tick_params(axis="x", labelsize=8)
-
-
-def _draw_success(axes: Axes, runs: list[_Run], style: _Style) -> None:
-    times = sorted(run.costs[0][0] for run in runs if run.costs)
-    if times:
-        shares = np.arange(len(times) + 1) / len(runs)
-        x = [times[0], *times, max(_end(runs), times[-1])]
-        axes.step(x, [*shares, shares[-1]], where="post", **_pen(style))
-
-
-def _draw_cost(axes: Axes, runs: list[_Run], style: _Style) -> None:
-    firsts = [run.costs[0][0] for run in runs if run.costs]
-    if not firsts:
+def _draw_cost(axes: Axes, runs: list[_Run], style: Style) -> None:
+    """Draw the median and the quartiles from the time on at which half of the runs have a path."""
+    firsts = sorted(run.costs[0][0] for run in runs if run.costs)
+    half = -(-len(runs) // 2)
+    if len(firsts) < half:
         return
-    times = np.geomspace(min(firsts), max(_end(runs), *firsts), _TIMES)
+    times = np.geomspace(firsts[half - 1], max(_end(runs), firsts[-1]), _TIMES)
     costs = np.array([_costs_at(run, times) for run in runs])
-    costs = np.quantile(costs, (0.25, 0.5, 0.75), axis=0, method="inverted_cdf")
-    low, median, high = np.where(np.isfinite(costs), costs, np.nan)
-    axes.plot(times, median, **_pen(style))
-    for quartile in (low, high):
-        axes.plot(times, quartile, **_pen(style) | {"linewidth": 0.6})
-    axes.fill_between(times, low, high, color=style.color, alpha=0.12, linewidth=0)
+    excess = np.maximum(100 * (costs - 1), _LEAST_EXCESS)
+    low, median, high = np.quantile(excess, (0.25, 0.5, 0.75), axis=0, method="inverted_cdf")
+    axes.plot(times, median, **style.line)
+    # The upper quartile is infinite until three quarters of the runs have a path.
+    top = np.where(np.isfinite(high), high, median)
+    axes.fill_between(times, low, top, color=style.color, alpha=0.15, linewidth=0)
 
 
 def _end(runs: Sequence[_Run]) -> float:
     return max(run.limit for run in runs)
 
 
-def _pen(style: _Style) -> dict[str, Any]:
-    return {"color": style.color, "linestyle": style.line, "linewidth": 1.8}
-
-
 def _costs_at(run: _Run, times: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the cost of a run at some times, infinite before its first path."""
     when = [time for time, _ in run.costs]
     costs = np.array([inf, *(cost for _, cost in run.costs)])
     reached: NDArray[np.float64] = costs[np.searchsorted(when, times, side="right")]
     return reached
 
 
-def _first_solution(run: _Run) -> float:
-    return run.costs[0][0] if run.costs else run.limit
-
-
-def _nodes(run: _Run) -> float:
-    return run.nodes
-
-
-def _boxes(runs: _Runs, value: Callable[[_Run], float], label: str) -> Figure:
-    """A panel for each planner, a box for each sampler: quartiles, and whiskers at 5 and 95 %."""
-    styles = _styles(runs)
-    figure, panels = _figure(list(runs), _PANEL_HEIGHT)
-    panels[0].set_ylabel(label)
-    for axes, by_sampler in zip(panels, runs.values(), strict=True):
-        drawn = axes.boxplot(
-            [[value(run) for run in of_sampler] for of_sampler in by_sampler.values()],
-            widths=0.6,
-            patch_artist=True,
-            whis=(5, 95),
-            showfliers=False,
-            medianprops={"color": "black", "linewidth": 2},
+def _boxes_figure(runs: _Runs, value: Callable[[_Run], float], label: str) -> Figure:
+    """Draw for each planner a box for each sampler: quartiles, and whiskers at 5 and 95 %."""
+    panels, styles = Panels(list(runs), _HEIGHT), _styles(runs)
+    places = {sampler: place for place, sampler in enumerate(styles)}
+    slanted = len(places) > 3
+    for axes, by_sampler in zip(panels.axes, runs.values(), strict=True):
+        for sampler, of_sampler in by_sampler.items():
+            _draw_box(axes, [value(run) for run in of_sampler], places[sampler], styles[sampler])
+        axes.set_xticks(
+            list(places.values()),
+            list(places),
+            rotation=25 if slanted else 0,
+            ha="right" if slanted else "center",
+            rotation_mode="anchor",
         )
-        for box, sampler in zip(drawn["boxes"], by_sampler, strict=True):
-            style = styles[sampler]
-            box.set(facecolor="white", edgecolor=style.color, hatch=style.hatch, linewidth=1.2)
-        slanted: dict[str, Any] = {"rotation": 25, "ha": "right", "rotation_mode": "anchor"}
-        axes.set_xticks(range(1, len(by_sampler) + 1), list(by_sampler), fontsize=8, **slanted)
-        axes.set_yscale("log")
-        axes.grid(axis="y", color="0.9", linewidth=0.6)
-    return figure
+    panels.use_logarithm("y")
+    panels.label(y=label)
+    panels.add_note("mark: median, box: quartiles,\nwhiskers: 5 % and 95 % of the runs")
+    return panels.figure
 
 
-def _ratios(results: Results, runs: _Runs, measure: str, label: str) -> Figure:
-    """A panel for each planner, in it a row for each map and one for all."""
+def _draw_box(axes: Axes, values: Sequence[float], place: float, style: Style) -> None:
+    line = {"color": style.color, "linewidth": 1.2}
+    axes.boxplot(
+        [values],
+        positions=[place],
+        widths=0.6,
+        patch_artist=True,
+        whis=(5, 95),
+        showfliers=False,
+        manage_ticks=False,
+        boxprops={"facecolor": "white", "edgecolor": style.color, "hatch": style.hatch},
+        medianprops=line | {"linewidth": 2},
+        whiskerprops=line,
+        capprops=line,
+    )
+    axes.plot(
+        place,
+        np.median(values),
+        marker=style.marker,
+        markersize=8,
+        color=style.color,
+        markeredgecolor="white",
+    )
+
+
+def _ratio_figure(results: Results, measure: str, label: str) -> Figure | None:
+    """Draw for each planner the ratios to OMPL's own sampler, a row for each kind of map.
+
+    Returns:
+        None where no planner with another sampler gets there.
+    """
     groups = {"all maps": results.overall} | dict(sorted(results.families.items()))
-    styles = {sampler: style for sampler, style in _styles(runs).items() if sampler != BASELINE}
-    places = dict(zip(styles, np.linspace(-0.25, 0.25, len(styles) + 2)[1:-1], strict=True))
-    figure, panels = _figure(list(runs), 0.9 + _ROW_HEIGHT * len(groups))
-    for axes, planner in zip(panels, runs, strict=True):
+    shown = [
+        summary.planner
+        for summary in results.overall
+        if summary.ratios and not _both_at_limit(summary, results.overall, measure)
+    ]
+    if not shown:
+        return None
+    samplers = dict.fromkeys(s.sampler for s in results.overall)
+    styles = {name: style for name, style in styles_of(samplers).items() if name != BASELINE}
+    offsets = dict(zip(styles, np.linspace(-0.3, 0.3, len(styles) + 2)[1:-1], strict=True))
+    planners = list(dict.fromkeys(shown))
+    panels = Panels(planners, _RATIO_HEIGHT + _RATIO_ROW_HEIGHT * len(groups))
+    any_hollow = False
+    for axes, planner in zip(panels.axes, planners, strict=True):
         axes.axvline(1, color="0.4", linewidth=1)
-        axes.grid(axis="x", color="0.9", linewidth=0.6)
         for row, summaries in enumerate(groups.values()):
             for summary in summaries:
                 if summary.planner == planner and summary.ratios:
-                    place, style = row + places[summary.sampler], styles[summary.sampler]
-                    _draw_ratio(axes, summary.ratios[measure], place, style)
-        axes.set_xscale("log")
-        axes.set_xlabel(f"ratio to {BASELINE}")
-        axes.tick_params(axis="y", labelsize=8)
-    panels[0].set_yticks(range(len(groups)), list(groups))
-    panels[0].set_ylim(len(groups) - 0.5, -0.5)
-    handles = [
-        Line2D([], [], color=style.color, marker=style.marker, label=sampler, linewidth=1.4)
-        for sampler, style in styles.items()
-    ]
-    figure.suptitle(f"{label}, inference counted in", fontsize=10)
-    _add_legend(figure, handles)
-    return figure
+                    hollow = _both_at_limit(summary, summaries, measure)
+                    any_hollow = any_hollow or hollow
+                    place = row + offsets[summary.sampler]
+                    _draw_ratio(axes, summary, measure, place, styles[summary.sampler], hollow)
+    panels.use_logarithm("x")
+    panels.axes[0].set_yticks(range(len(groups)), list(groups))
+    panels.axes[0].set_ylim(len(groups) - 0.5, -0.5)
+    panels.label(x=f"ratio to {BASELINE}, below 1 is better")
+    note = " (hollow: most runs of both end at the limit)" if any_hollow else ""
+    panels.figure.suptitle(f"{label}, with inference{note}", fontsize=10)
+    panels.add_legend(legend_handles(styles, dashed=False))
+    return panels.figure
 
 
-def _draw_ratio(axes: Axes, ratio: Interval, place: float, style: _Style) -> None:
+def _both_at_limit(summary: Summary, summaries: Sequence[Summary], measure: str) -> bool:
+    """Return whether most runs with a sampler, and with OMPL's own, end before they get there."""
+    own = next(s for s in summaries if (s.planner, s.sampler) == (summary.planner, BASELINE))
+    return min(summary.censored[measure], own.censored[measure]) >= 0.5
+
+
+def _draw_ratio(
+    axes: Axes, summary: Summary, measure: str, place: float, style: Style, hollow: bool
+) -> None:
+    ratio = summary.ratios[measure]
     axes.plot([ratio.low, ratio.high], [place, place], color=style.color, linewidth=1.4)
-    axes.plot(ratio.median, place, color=style.color, marker=style.marker, markersize=5)
+    axes.plot(
+        ratio.median,
+        place,
+        color=style.color,
+        marker=style.marker,
+        markersize=5,
+        markerfacecolor="white" if hollow else style.color,
+    )

@@ -14,77 +14,80 @@ from typing import cast
 from tqdm import tqdm
 
 from ..common.parallel import fork_server, interrupts_held
-from .settings import LEARNED
+from ..planning.heatmap_sources import LEARNED
 from .worker import Job, run_job
 
-# Imported once, by the server that the processes are forked from.
+# Imported once, by the server from which the processes are forked.
 _PRELOAD = ("cbagan_ompl.benchmarking.worker",)
-# Torch takes a second, and our modules import it only once it is needed.
+# Torch takes a second to import, and the modules of this package import it only when needed.
 _PRELOAD_LEARNED = ("cbagan_ompl.inference.predictor", "torch")
 
-# An interrupt that another thread took, or that came just before a wait, does not end the wait.
-_LOOK_AGAIN_S = 0.5
+# An interrupt that another thread takes, or that comes just before a wait, does not end the wait.
+_POLL_S = 0.5
 
-# Characters of the end of a crashed process' output.
-_LAST_WORDS = 4000
+# Characters that are kept of the end of a crashed process' output.
+_OUTPUT_KEPT = 4000
 
 
 def run_jobs(jobs: Sequence[Job], processes: int, show_progress: bool = True) -> dict[str, str]:
-    """Run jobs, several at a time; a crash of one, even an abort, leaves the others alone.
+    """Run jobs, several at a time; a crash of one, even an abort, does not affect the others.
 
     Args:
         jobs: the tasks.
-        processes: how many run at a time.
-        show_progress: draw a progress bar with the time left.
+        processes: number of tasks that run at a time.
+        show_progress: show a progress bar with the remaining time.
 
     Returns:
-        For each task that failed, by its name, the end of what it said.
+        For each task that failed, by its name, the end of its output.
 
     Raises:
-        KeyboardInterrupt: after an interrupt; the tasks that were running are given up.
+        KeyboardInterrupt: after an interrupt; the tasks that were running are terminated.
     """
     waiting = list(reversed(jobs))
-    running: dict[Connection, _Running] = {}
+    running: dict[Connection, _RunningJob] = {}
     failures: dict[str, str] = {}
     rounds = sum(job.settings.runs for job in jobs)
     bar = tqdm(total=rounds, unit="round", disable=not show_progress, dynamic_ncols=True)
-    # Outermost: an interrupt is raised once no process is left that would use the folder.
+    # Outermost: an interrupt is raised only when no process is left that uses the folder.
     with interrupts_held() as interrupted, bar, TemporaryDirectory() as folder:
         try:
             while waiting or running:
                 while waiting and len(running) < processes:
-                    started = _Running(waiting.pop(), Path(folder))
+                    started = _RunningJob(waiting.pop(), Path(folder))
                     running[started.rounds] = started
-                ready = cast("list[Connection]", wait([*running, interrupted], _LOOK_AGAIN_S))
+                ready = cast("list[Connection]", wait([*running, interrupted], _POLL_S))
                 if interrupted in ready:
                     break
                 for pipe in ready:
                     done = running[pipe].rounds_done()
                     bar.update(done)
                     if done == 0:
-                        _end(running.pop(pipe), failures, bar)
+                        _finish(running.pop(pipe), failures, bar)
         finally:
-            for given_up in running.values():
-                given_up.process.terminate()
-            for given_up in running.values():
-                given_up.last_words()
+            for unfinished in running.values():
+                unfinished.process.terminate()
+            for unfinished in running.values():
+                unfinished.join()
     return failures
 
 
-def _end(ended: _Running, failures: dict[str, str], bar: tqdm[None]) -> None:
+def _finish(ended: _RunningJob, failures: dict[str, str], bar: tqdm[None]) -> None:
     name = ended.job.task.name
-    words = ended.last_words()
+    output = ended.join()
     bar.update(ended.rounds_left)
-    if words:
-        failures[name] = words
-        bar.write(f"task {name} failed: {words.splitlines()[-1]}", sys.stderr)
+    if output:
+        failures[name] = output
+        bar.write(f"task {name} failed: {output.splitlines()[-1]}", sys.stderr)
 
 
-class _Running:
+class _RunningJob:
     """A job in its process.
 
     Attributes:
-        rounds: has something to read after each round of runs, and when the process is over.
+        rounds: connection that is readable after each round of runs, and after the end of the
+            process.
+        rounds_left: rounds that have not been reported yet.
+        process: the process.
     """
 
     def __init__(self, job: Job, folder: Path) -> None:
@@ -97,10 +100,10 @@ class _Running:
         self.rounds, writer = context.Pipe(duplex=False)
         self.process = context.Process(target=_work, args=(job, writer, self._output), daemon=True)
         self.process.start()
-        writer.close()  # the process has its own copy: with that one the pipe ends
+        writer.close()  # the process holds its own copy, whose end is the end of the pipe
 
     def rounds_done(self) -> int:
-        """One when a round is done, none when the process is over."""
+        """Return 1 for a round that is done, 0 when the process has ended."""
         try:
             self.rounds.recv_bytes()
         except EOFError:
@@ -108,21 +111,22 @@ class _Running:
         self.rounds_left -= 1
         return 1
 
-    def last_words(self) -> str:
-        """Wait for the end; what a process that failed has said, empty for one that did not."""
+    def join(self) -> str:
+        """Wait for the process; return the end of its output, nothing if it succeeded."""
         self.process.join()
         self.rounds.close()
         code = self.process.exitcode
         if not code:
             return ""
-        self.job.draft.unlink(missing_ok=True)
+        for unfinished in self.job.log.parent.glob(f"{self.job.log.name}.*"):
+            unfinished.unlink()
         output = self._output.read_text(encoding="utf-8", errors="replace")
         end = f"ended by {signal.Signals(-code).name}" if code < 0 else ""
-        return f"{output[-_LAST_WORDS:]}\n{end}".strip() or f"exit status {code}"
+        return f"{output[-_OUTPUT_KEPT:]}\n{end}".strip() or f"exit status {code}"
 
 
 def _work(job: Job, rounds: Connection, output: Path) -> None:
-    """What the process does; a traceback goes to its output as well."""
+    """Run a job in its process, with all output, tracebacks too, in a file."""
     with output.open("wb") as file:
         for stream in (1, 2):
             os.dup2(file.fileno(), stream)

@@ -1,30 +1,26 @@
-"""What a benchmark compares: one value for all tasks of it, kept beside their results."""
+"""What a benchmark compares: one value for all tasks of it, saved beside their results."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
-from math import isfinite
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from ..common.validation import check_at_least
+from ..common.files import read_text, write_json
+from ..common.validation import check_at_least, positive_number, whole_number
 from ..errors import ConfigError
-from ..sampling.options import (
-    ADAPTATION_RULES,
-    DEFAULT_UNIFORM_FRACTION,
-    Adaptation,
-    SamplerOptions,
-)
+from ..planning.heatmap_sources import LEARNED, UNIFORM
+from ..sampling.options import SamplerOptions
 
 #: OMPL's own sampler, which the others are compared with.
-BASELINE = "uniform"
+BASELINE = UNIFORM
 
-#: The sampler of the bundled model, unless another one is given.
-LEARNED = "learned"
+#: By default a path is good once its cost is within so many percent of the best known one.
+DEFAULT_WITHIN = 5
 
 
 @dataclass(frozen=True)
@@ -33,26 +29,29 @@ class Settings:
 
     Attributes:
         planners: OMPL's names.
-        samplers: of :data:`cbagan_ompl.planning.plan.SAMPLERS`, and the keys of ``models`` and of
-            ``heatmap_dirs``.
-        runs: of each planner with each sampler on each task.
-        time: limit of a run, seconds.
+        samplers: of :data:`cbagan_ompl.planning.heatmap_sources.SAMPLERS`, and the keys of
+            ``models`` and of ``heatmap_dirs``.
+        runs: number of runs of each planner with each sampler on each task.
+        time: time limit of a run, seconds.
         range: longest edge of the planners that have this parameter, world units; by default
             OMPL's choice (a fifth of the map's diagonal).
         parameters: for some planners ``{parameter: value}``.
-        uniform_fraction: share of draws that stays uniform over free space, in (0, 1].
-        adaptation: names of the parts of the adaptation that are on, see
-            :mod:`cbagan_ompl.sampling.adaptation`.
-        sharpness: power of the heat maps that draws follow; by default what suits each planner,
-            see :func:`cbagan_ompl.attach`.
-        models: for some samplers the file of the model that they draw from; the bundled one for
-            ``learned`` by default.
+        sampler_options: how samples follow the heat maps; its seed, an int of at least 0, is also
+            that of OMPL and of random tasks.
+        models: for some samplers the file of the model that makes their heat maps; the bundled one
+            for ``learned`` by default.
         heatmap_dirs: for some samplers the folder of their heat maps, one for each task.
-        radius: of the robot, world units.
-        seed: at least 0.
+        radius: radius of the robot, world units.
+        within: threshold of a good path, in percent above the best known cost: reports and plots
+            show the time until a run gets there.
 
     Raises:
         ConfigError: an option that makes no sense.
+
+    Example:
+        >>> settings = Settings(planners=("RRTstar",), samplers=("uniform", "corridor"), runs=3)
+        >>> settings.to_dict()["adaptation"]
+        ['connectivity', 'coverage', 'stagnation']
     """
 
     planners: tuple[str, ...] = ("RRT", "RRTstar", "InformedRRTstar")
@@ -61,24 +60,25 @@ class Settings:
     time: float = 0.4
     range: float | None = None
     parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    uniform_fraction: float = DEFAULT_UNIFORM_FRACTION
-    adaptation: tuple[str, ...] = ADAPTATION_RULES
-    sharpness: float | None = None
+    sampler_options: SamplerOptions = field(default_factory=lambda: SamplerOptions(seed=0))
     models: Mapping[str, str] = field(default_factory=dict)
     heatmap_dirs: Mapping[str, str] = field(default_factory=dict)
     radius: float = 0.0
-    seed: int = 0
+    within: int = DEFAULT_WITHIN
 
     def __post_init__(self) -> None:
         for what, names in (("planners", self.planners), ("samplers", self.samplers)):
             if not names or len(set(names)) < len(names):
                 raise ConfigError(f"{what} must be named, and each once, got {', '.join(names)!r}")
         check_at_least("runs", self.runs, 1)
-        for name, value in (("time", self.time), ("range", self.range)):
-            if value is not None and not (isfinite(value) and value > 0):
-                raise ConfigError(f"{name} must be above 0, got {value}")
-        check_at_least("seed", self.seed, 0)
-        self.sampler_options(self.seed)
+        positive_number("time", self.time)
+        if self.range is not None:
+            positive_number("range", self.range)
+        seed = self.sampler_options.seed
+        if not isinstance(seed, int):
+            raise ConfigError(f"the seed of a benchmark must be an int, got {seed!r}")
+        check_at_least("seed", seed, 0)
+        whole_number("within", self.within, 1)
         for planner in self.parameters:
             if planner not in self.planners:
                 raise ConfigError(
@@ -86,27 +86,50 @@ class Settings:
                     f"{', '.join(self.planners)}"
                 )
 
-    def sampler_options(self, seed: int) -> SamplerOptions:
-        """Return how samples follow the heat maps."""
-        return SamplerOptions(
-            self.uniform_fraction, self.sharpness, Adaptation.of(self.adaptation), seed
-        )
+    @property
+    def seed(self) -> int:
+        """The seed of OMPL, of the samples and of random tasks."""
+        assert isinstance(self.sampler_options.seed, int), "checked above"
+        return self.sampler_options.seed
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the settings as they are saved, JSON-ready; the sampler options lie flat in them.
+
+        The adaptation is the list of the names of its rules that are on.
+        """
+        saved: dict[str, Any] = {}
+        for name in (entry.name for entry in fields(self)):
+            if name == "sampler_options":
+                saved["uniform_fraction"] = self.sampler_options.uniform_fraction
+                saved["adaptation"] = list(self.sampler_options.adaptation.names)
+                saved["sharpness"] = self.sampler_options.sharpness
+                saved["seed"] = self.seed
+            else:
+                saved[name] = getattr(self, name)
+        return json.loads(json.dumps(saved))  # type: ignore[no-any-return]
 
     def save(self, path: Path) -> None:
-        """Write the settings as JSON."""
-        path.write_text(json.dumps(asdict(self), indent=2) + "\n", encoding="utf-8")
+        """Write the settings as JSON.
+
+        Raises:
+            ConfigError: the file cannot be written.
+        """
+        write_json(path, self.to_dict())
 
     def is_saved_in(self, path: Path) -> bool:
-        """Whether a file that :meth:`save` wrote holds the same settings."""
-        saved = json.loads(path.read_text(encoding="utf-8"))
-        return bool(saved == json.loads(json.dumps(asdict(self))))
+        """Return whether a file that :meth:`save` wrote holds the same settings."""
+        return bool(json.loads(read_text(path, ConfigError)) == self.to_dict())
 
 
 def parse_parameters(assignments: list[str]) -> dict[str, dict[str, Any]]:
-    """Parameters of planners from texts such as ``RRTstar.rewire_factor=1.2``.
+    """Return parameters of planners from texts such as ``RRTstar.rewire_factor=1.2``.
 
     Raises:
         ConfigError: a text of another form.
+
+    Example:
+        >>> parse_parameters(["RRTstar.rewire_factor=1.2"])
+        {'RRTstar': {'rewire_factor': 1.2}}
     """
     parameters: dict[str, dict[str, Any]] = {}
     for assignment in assignments:

@@ -1,8 +1,8 @@
-"""What the runs of a benchmark amount to: paired by task, censored where unsolved."""
+"""Statistics of the runs of a benchmark: paired by task, censored where unsolved."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 
@@ -31,10 +31,10 @@ _TAILS = (0.025, 0.975)
 
 @dataclass(frozen=True)
 class Interval:
-    """A median over tasks with its bootstrap 95 % interval; infinite where unsolved runs rule.
+    """A median over tasks with its bootstrap 95 % interval; infinite where most runs are unsolved.
 
     Attributes:
-        median: of the medians over the runs on each task.
+        median: median over the tasks of the medians over the runs.
         low: lower end of the interval.
         high: upper end of the interval.
     """
@@ -46,19 +46,19 @@ class Interval:
 
 @dataclass(frozen=True)
 class Summary:
-    """A planner with a sampler over some tasks.
+    """The statistics of a planner with a sampler over some tasks.
 
     Attributes:
         planner: OMPL's name.
-        sampler: its name.
-        tasks: how many.
-        runs: on all of them.
-        success: share of the runs with an exact path that passed the check again.
-        measures: for each of :data:`MEASURES` its median.
-        censored: for each of them the share of runs of which only a lower bound is known, because
-            they ended before; such a run counts with that bound, costs as infinite.
-        ratios: for each of them the median over the tasks of the ratio to the same planner with
-            OMPL's own sampler; empty for that one itself, or without it.
+        sampler: name of the sampler.
+        tasks: number of tasks.
+        runs: number of runs on all of them.
+        success: fraction of the runs with an exact path that passed the second check.
+        measures: the median of each measure, see :func:`measures_of`.
+        censored: for each measure the fraction of the runs of which only a lower bound is known,
+            because they ended before; such a run counts with that bound, costs as infinite.
+        ratios: for each measure the median over the tasks of the ratio to the same planner with
+            OMPL's own sampler; empty for that sampler itself, or without it.
     """
 
     planner: str
@@ -77,19 +77,19 @@ class Results:
 
     Attributes:
         overall: over all tasks, one for each planner with each sampler.
-        families: the same for each map family; a map without one is a family of its own.
+        families: the same for each kind of map; a map of no kind is a kind of its own.
     """
 
     overall: list[Summary]
     families: dict[str, list[Summary]]
 
 
-# A run's value, and whether it is but a lower bound.
+# The value of a run, and whether it is only a lower bound.
 _Value = tuple[float, bool]
 _Reader = Callable[[Mapping[str, str], ExperimentLog], _Value]
 
 
-def _planning(name: str) -> _Reader:
+def _planning_time(name: str) -> _Reader:
     def read(run: Mapping[str, str], log: ExperimentLog) -> _Value:
         time = number(run[name])
         return (log.time_limit, True) if time is None else (time, False)
@@ -97,9 +97,9 @@ def _planning(name: str) -> _Reader:
     return read
 
 
-def _total(name: str) -> _Reader:
+def _total_time(name: str) -> _Reader:
     def read(run: Mapping[str, str], log: ExperimentLog) -> _Value:
-        time, censored = _planning(name)(run, log)
+        time, censored = _planning_time(name)(run, log)
         total = time + float(run[INFERENCE])
         # One limit for all, so that two runs that did not get there are a tie.
         return min(total, log.time_limit), censored or total > log.time_limit
@@ -107,7 +107,7 @@ def _total(name: str) -> _Reader:
     return read
 
 
-def _excess(name: str) -> _Reader:
+def _relative_cost(name: str) -> _Reader:
     def read(run: Mapping[str, str], log: ExperimentLog) -> _Value:
         cost = number(run[name])
         return (inf, True) if cost is None else (cost / float(log.parameters[BEST_KNOWN]), False)
@@ -122,44 +122,71 @@ def _effort(name: str) -> _Reader:
     return read
 
 
-#: What is measured: times in seconds, of planning alone (``_s``) and with the inference counted in
-#: (``_total_s``); costs in multiples of the best known one of the task.
-MEASURES: dict[str, _Reader] = {
-    "inference_s": lambda run, _: (float(run[INFERENCE]), False),
-    "first_solution_s": _planning(FIRST_TIME),
-    "first_solution_total_s": _total(FIRST_TIME),
-    **{
-        f"within_{percent}_percent_s": _planning(time_within(percent)) for percent in WITHIN_PERCENT
-    },
-    **{
-        f"within_{percent}_percent_total_s": _total(time_within(percent))
-        for percent in WITHIN_PERCENT
-    },
-    "first_cost": _excess(FIRST_COST),
-    "final_cost": _excess(COST),
-    "nodes": _effort(NODES),
-    "collision_checks": _effort(CHECKS),
-}
-
 # The baseline has none.
 _NO_RATIO = frozenset({"inference_s"})
 
 
-def results_of(logs: Sequence[ExperimentLog]) -> Results:
-    """Summaries over all tasks and by map family; arguments as for :func:`summarise`."""
+def within_key(percent: int, total: bool = False) -> str:
+    """Return the name of the time to a cost within so many percent of the best known one.
+
+    Args:
+        percent: the threshold.
+        total: with inference.
+
+    Example:
+        >>> within_key(5, total=True)
+        'within_5_percent_total_s'
+    """
+    return f"within_{percent}_percent{'_total' if total else ''}_s"
+
+
+def measures_of(percents: Iterable[int] = WITHIN_PERCENT) -> dict[str, _Reader]:
+    """Return what is measured, by name.
+
+    Times are in seconds, of planning alone (``_s``) and with inference (``_total_s``); costs are
+    multiples of the best known one of the task.
+
+    Args:
+        percents: thresholds of good paths, percent above the best known cost.
+    """
+    names = {percent: time_within(percent) for percent in percents}
+    return {
+        "inference_s": lambda run, _: (float(run[INFERENCE]), False),
+        "first_solution_s": _planning_time(FIRST_TIME),
+        "first_solution_total_s": _total_time(FIRST_TIME),
+        **{within_key(percent): _planning_time(name) for percent, name in names.items()},
+        **{within_key(percent, total=True): _total_time(name) for percent, name in names.items()},
+        "first_cost": _relative_cost(FIRST_COST),
+        "final_cost": _relative_cost(COST),
+        "nodes": _effort(NODES),
+        "collision_checks": _effort(CHECKS),
+    }
+
+
+# A log, and the runs of one planner with one sampler in it.
+_TaskRuns = tuple[ExperimentLog, list[Mapping[str, str]]]
+
+
+def results_of(logs: Sequence[ExperimentLog], percents: Iterable[int] = WITHIN_PERCENT) -> Results:
+    """Return summaries over all tasks and by kind of map; arguments as for :func:`summarize`."""
+    measures = measures_of(percents)
     families: dict[str, list[ExperimentLog]] = {}
     for log in logs:
         families.setdefault(log.parameters[FAMILY], []).append(log)
-    return Results(summarise(logs), {name: summarise(some) for name, some in families.items()})
+    by_family = {name: summarize(some, measures) for name, some in families.items()}
+    return Results(summarize(logs, measures), by_family)
 
 
-def summarise(logs: Sequence[ExperimentLog]) -> list[Summary]:
-    """Summaries of all planners with all samplers over the tasks of some logs.
+def summarize(
+    logs: Sequence[ExperimentLog], measures: Mapping[str, _Reader] | None = None
+) -> list[Summary]:
+    """Return summaries of all planners with all samplers over the tasks of some logs.
 
     Args:
         logs: one for each task, of the same planners and samplers.
+        measures: what is measured; that of :func:`measures_of` by default.
     """
-    rows: dict[tuple[str, str], list[tuple[ExperimentLog, list[Mapping[str, str]]]]] = {}
+    rows: dict[tuple[str, str], list[_TaskRuns]] = {}
     for log in logs:
         for planner in log.planners:
             name, sampler = planner.name.removeprefix(GEOMETRIC).split("_", 1)
@@ -169,7 +196,7 @@ def summarise(logs: Sequence[ExperimentLog]) -> list[Summary]:
             measure: [
                 np.array([read(run, log) for run in runs]).reshape(-1, 2) for log, runs in tasks
             ]
-            for measure, read in MEASURES.items()
+            for measure, read in (measures or measures_of()).items()
         }
         for key, tasks in rows.items()
     }
@@ -179,7 +206,7 @@ def summarise(logs: Sequence[ExperimentLog]) -> list[Summary]:
     ]
 
 
-def _solved(tasks: Sequence[tuple[ExperimentLog, list[Mapping[str, str]]]]) -> list[bool]:
+def _solved(tasks: Sequence[_TaskRuns]) -> list[bool]:
     return [run[SOLVED] == "1" for _, runs in tasks for run in runs]
 
 
@@ -210,55 +237,65 @@ def _summary(
 
 
 def median_interval(tasks: Sequence[NDArray[np.float64]]) -> Interval:
-    """The median over tasks of the medians over runs.
+    """Return the median over tasks of the medians over runs.
 
-    The bootstrap draws tasks, and for each of them runs, so that neither the choice of the tasks
-    nor the luck of the runs is taken for certain.
+    The bootstrap resamples the tasks, and the runs of each task, so that the interval covers both
+    the choice of the tasks and the chance in the runs. It is the percentile bootstrap of `Efron and
+    Tibshirani, An Introduction to the Bootstrap (1993)
+    <https://doi.org/10.1201/9780429246593>`_, in two stages.
 
     Args:
-        tasks: for each task the values of its runs, (R,); infinite ones are allowed.
+        tasks: for each task the values of its runs, shape (R,); infinite ones are allowed.
     """
     rng = np.random.default_rng(0)
     medians = np.array([np.median(runs) for runs in tasks])
-    return _interval(medians, np.array([_resampled(runs, rng) for runs in tasks]), rng)
+    return _interval(medians, np.array([_resample_medians(runs, rng) for runs in tasks]), rng)
 
 
 def ratio_interval(
     tasks: Sequence[NDArray[np.float64]], baseline: Sequence[NDArray[np.float64]]
 ) -> Interval:
-    """The median over tasks of the ratio of the medians over runs.
+    """Return the median over tasks of the ratio of the medians over runs.
 
     Args:
         tasks: as for :func:`median_interval`.
-        baseline: what to divide by, for the same tasks.
+        baseline: the divisor: the values of the baseline, for the same tasks.
     """
     rng = np.random.default_rng(0)
-    medians = (np.array([np.median(runs) for runs in side]) for side in (tasks, baseline))
-    resampled = (np.array([_resampled(runs, rng) for runs in side]) for side in (tasks, baseline))
+    medians = (np.array([np.median(runs) for runs in values]) for values in (tasks, baseline))
+    resampled = (
+        np.array([_resample_medians(runs, rng) for runs in values]) for values in (tasks, baseline)
+    )
     return _interval(ratio(*medians), ratio(*resampled), rng)
 
 
 def ratio(values: NDArray[np.float64], baseline: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Quotients; two equal values are a tie, also where both are infinite."""
+    """Return quotients; two equal values have the ratio 1, also where both are infinite."""
     ones: NDArray[np.float64] = np.ones(values.shape)
     with np.errstate(divide="ignore"):
         return np.divide(values, baseline, out=ones, where=values != baseline)
 
 
-def _resampled(runs: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
-    """Medians of the runs on a task, drawn anew with replacement."""
-    drawn = runs[rng.integers(len(runs), size=(_RESAMPLES, len(runs)))]
-    medians: NDArray[np.float64] = np.median(drawn, axis=1)
+def _resample_medians(runs: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+    """Return medians of the runs on a task, resampled with replacement, shape (B,)."""
+    samples = runs[rng.integers(len(runs), size=(_RESAMPLES, len(runs)))]
+    medians: NDArray[np.float64] = np.median(samples, axis=1)
     return medians
 
 
 def _interval(
     medians: NDArray[np.float64], resampled: NDArray[np.float64], rng: np.random.Generator
 ) -> Interval:
-    """Args: medians of each task, (T,), and for each task its resampled ones, (T, B)."""
+    """Return the interval of a median over tasks.
+
+    Args:
+        medians: of each task, shape (T,).
+        resampled: the resampled medians of each task, shape (T, B).
+        rng: chooses the tasks.
+    """
     tasks, resamples = resampled.shape
-    drawn = rng.integers(tasks, size=(tasks, resamples))
-    spread = np.median(resampled[drawn, np.arange(resamples)], axis=0)
+    chosen = rng.integers(tasks, size=(tasks, resamples))
+    spread = np.median(resampled[chosen, np.arange(resamples)], axis=0)
     # Quantiles that are values of the sample, because there is nothing between infinite ones.
     low, high = np.quantile(spread, _TAILS, method="inverted_cdf")
     return Interval(float(np.median(medians)), float(low), float(high))

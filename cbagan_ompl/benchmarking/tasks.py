@@ -1,4 +1,4 @@
-"""Which maps and tasks a benchmark runs on."""
+"""The choice of the maps and tasks that a benchmark runs on."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ..maps.loading import BUNDLED, bundled_maps
 from ..maps.tasks import Task, load_tasks, tasks_of
 from ..sampling.heatmap import Heatmap
 
-# Random tasks are at least this share of the map's longer side apart, as the crow flies.
+# Start and goal of a random task are at least this fraction of the map's longer side apart.
 _LEAST_DISTANCE = 0.5
 _RANDOM_TASKS = 4
 _MAX_TRIES = 1000
@@ -30,7 +30,7 @@ class BenchmarkTask:
 
     Attributes:
         grid: the map, inflated by the robot's radius.
-        number: of the task among those of its map, from 0.
+        number: number of the task among those of its map, from 0.
         task: the task.
     """
 
@@ -40,7 +40,7 @@ class BenchmarkTask:
 
     @property
     def name(self) -> str:
-        """``MAP_NUMBER``: what logs and heat maps of the task are called."""
+        """``MAP_NUMBER``: the name of logs and heat maps of the task."""
         return f"{re.sub(r'[^A-Za-z0-9_.-]', '_', self.grid.name)}_{self.number}"
 
 
@@ -52,18 +52,16 @@ def select_tasks(
     seed: int = 0,
     map_options: Mapping[str, Any] | None = None,
 ) -> list[BenchmarkTask]:
-    """The tasks on some maps.
-
-    They are those of a file, or else those that come with a map, or else random ones.
+    """Return the tasks on some maps: those of a file, else those of the map, else random ones.
 
     Args:
         maps: map files, or ``bundled:NAME``; all bundled maps for none.
         tasks: a ``.csv`` or ``.scen`` file, see :func:`cbagan_ompl.load_tasks`.
         tasks_per_map: at most so many of each map, spread evenly over its list; the number of
-            random ones for a map that comes with none.
-        radius: of the robot, world units.
-        seed: of random tasks.
-        map_options: of :meth:`GridMap.load`.
+            random ones for a map without tasks.
+        radius: radius of the robot, world units.
+        seed: seed of random tasks.
+        map_options: keyword arguments of :meth:`GridMap.load`.
 
     Raises:
         MapError: a map or task file that cannot be used.
@@ -93,7 +91,7 @@ def select_tasks(
 
 
 def _spread(count: int, most: int | None) -> list[int]:
-    """At most so many of the numbers below ``count``, spread evenly."""
+    """Return at most so many of the numbers below ``count``, spread evenly."""
     if most is None or most >= count:
         return list(range(count))
     numbers: list[int] = np.linspace(0, count - 1, most).round().astype(int).tolist()
@@ -101,12 +99,17 @@ def _spread(count: int, most: int | None) -> list[int]:
 
 
 def random_tasks(grid: GridMap, count: int, seed: int) -> list[Task]:
-    """Tasks between random free pixels of one connected part, at least half the map apart.
+    """Return tasks between random connected free pixels, at least half the map apart.
 
     The same map and seed give the same tasks.
 
+    Args:
+        grid: the map, inflated by the robot's radius.
+        count: number of tasks.
+        seed: at least 0.
+
     Raises:
-        TaskError: the map has no such pair of pixels, or hardly one.
+        TaskError: the map has none or too few such pairs of pixels.
     """
     rng = np.random.default_rng((seed, crc32(grid.name.encode()), crc32(grid.cells)))
     rows, columns = np.nonzero(grid.free)
@@ -128,10 +131,14 @@ def random_tasks(grid: GridMap, count: int, seed: int) -> list[Task]:
 
 
 def heatmap_file(folder: str, task: BenchmarkTask) -> Heatmap:
-    """The heat map of a task in a folder of them: ``MAP_NUMBER.npy`` or an image of that name.
+    """Return the heat map of a task from a folder: ``MAP_NUMBER.npy`` or ``MAP_NUMBER.png``.
+
+    Args:
+        folder: folder of the heat maps.
+        task: the task.
 
     Raises:
-        HeatmapError: there is none, or one that does not belong to the task's map.
+        HeatmapError: there is none, or it does not fit the map of the task.
     """
     files = [Path(folder) / f"{task.name}{suffix}" for suffix in (".npy", ".png")]
     for file in files:

@@ -1,4 +1,4 @@
-"""The work on one task."""
+"""The work on one task: heat maps, OMPL's Benchmark, the log."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from zlib import crc32
 
+from ..common.files import write_atomically
 from ..errors import ConfigError
-from ..planning.heatmap_sources import SAMPLERS, HeatmapSource, heatmap_source
+from ..planning.heatmap_sources import LEARNED, SAMPLERS, HeatmapSource, heatmap_source
 from ..planning.ompl_benchmark import PlannerVariant, RunOptions, check_variants, run_benchmark
 from ..sampling.heatmap import Heatmap
-from .logs import ExperimentLog, format_log, join_logs, parse_log
-from .measures import FAMILY, MAP, add_measures
-from .settings import LEARNED, Settings
+from .logs import ExperimentLog, concatenate_logs, format_log, parse_log
+from .measures import FAMILY, MAP, add_measures, thresholds
+from .settings import Settings
 from .tasks import BenchmarkTask, heatmap_file
 
 
@@ -24,21 +25,16 @@ class Job:
     Attributes:
         task: the task.
         settings: what is compared on it.
-        log: file to be written at the end: OMPL's log with all measures.
+        log: the file that is written at the end: OMPL's log with all measures.
     """
 
     task: BenchmarkTask
     settings: Settings
     log: Path
 
-    @property
-    def draft(self) -> Path:
-        """File that becomes the log once it is whole."""
-        return self.log.with_suffix(".part")
-
 
 def check_job(job: Job) -> None:
-    """Refuse what cannot run, before time is spent.
+    """Raise if a job cannot run, before time is spent.
 
     Raises:
         PlannerError: an unknown planner, or one that no hook reaches on this OMPL.
@@ -47,12 +43,12 @@ def check_job(job: Job) -> None:
         HeatmapError: no heat map of the task where there should be one.
     """
     grid, task = job.task.grid, job.task.task
-    ends = grid.check_task(task.start, task.goal)
-    check_variants(grid, ends, _entrants(job), _options(job))
+    endpoints = grid.check_task(task.start, task.goal)
+    check_variants(grid, endpoints, _variants(job), _options(job))
 
 
 def check_heatmaps(job: Job) -> None:
-    """Refuse a task that lacks a heat map of its own.
+    """Raise if a heat map of the task is missing.
 
     Raises:
         HeatmapError: no heat map of the task where there should be one.
@@ -69,38 +65,42 @@ def run_job(job: Job, after_round: Callable[[], None]) -> None:
         after_round: called after each round of runs.
     """
     grid, task = job.task.grid, job.task.task
-    ends = grid.check_task(task.start, task.goal)
-    recording = run_benchmark(job.task.name, grid, ends, _entrants(job), _options(job), after_round)
-    log = join_logs([parse_log(text) for text in recording.logs])
-    log = add_measures(_described(log, job), recording.runs, task.optimal_cost)
-    job.draft.write_text(format_log(log), encoding="utf-8")
-    job.draft.replace(job.log)
+    endpoints = grid.check_task(task.start, task.goal)
+    recording = run_benchmark(
+        job.task.name, grid, endpoints, _variants(job), _options(job), after_round
+    )
+    log = concatenate_logs([parse_log(text) for text in recording.logs])
+    log = add_measures(
+        _add_task(log, job), recording.runs, task.optimal_cost, thresholds(job.settings.within)
+    )
+    write_atomically(job.log, format_log(log))
 
 
 def _options(job: Job) -> RunOptions:
     settings = job.settings
+    seed = (settings.seed + crc32(job.task.name.encode())) % 2**32
     return RunOptions(
         runs=settings.runs,
         time=settings.time,
         range=settings.range,
         tolerance=job.task.grid.resolution,
-        sampler=settings.sampler_options((settings.seed + crc32(job.task.name.encode())) % 2**32),
+        sampler=replace(settings.sampler_options, seed=seed),
     )
 
 
-def _entrants(job: Job) -> list[PlannerVariant]:
+def _variants(job: Job) -> list[PlannerVariant]:
     settings = job.settings
-    providers = {sampler: _provider(job, sampler) for sampler in settings.samplers}
+    sources = {sampler: _source(job, sampler) for sampler in settings.samplers}
     return [
         PlannerVariant(
-            planner, sampler, provide, tuple(dict(settings.parameters.get(planner, {})).items())
+            planner, sampler, source, tuple(dict(settings.parameters.get(planner, {})).items())
         )
         for planner in settings.planners
-        for sampler, provide in providers.items()
+        for sampler, source in sources.items()
     ]
 
 
-def _provider(job: Job, sampler: str) -> HeatmapSource | None:
+def _source(job: Job, sampler: str) -> HeatmapSource | None:
     if sampler in job.settings.heatmap_dirs:
         heatmap = heatmap_file(job.settings.heatmap_dirs[sampler], job.task)
 
@@ -114,14 +114,14 @@ def _provider(job: Job, sampler: str) -> HeatmapSource | None:
     return heatmap_source(sampler if model is None else LEARNED, model)[1]
 
 
-def _described(log: ExperimentLog, job: Job) -> ExperimentLog:
+def _add_task(log: ExperimentLog, job: Job) -> ExperimentLog:
     (start_x, start_y), (goal_x, goal_y) = job.task.task.start, job.task.task.goal
     return replace(
         log,
         parameters={
             **log.parameters,
             MAP: job.task.grid.name,
-            # A map without a family is one of its own.
+            # A map of no kind is a kind of its own.
             FAMILY: job.task.task.family or job.task.grid.name,
             "task INTEGER": str(job.task.number),
             "start_x REAL": f"{start_x:.9g}",

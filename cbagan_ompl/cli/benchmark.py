@@ -9,27 +9,28 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from ..benchmarking.settings import LEARNED, Settings, parse_parameters
+from ..benchmarking.settings import Settings, parse_parameters
 from ..common.validation import check_at_least
 from ..errors import ConfigError
 from ..maps.loading import bundled_maps
-from .options import add_map_options, add_sampler_options, map_options
+from ..planning.heatmap_sources import LEARNED
+from .options import add_map_options, add_sampler_options, map_options, sampler_options
 
 _HELP = """\
 Compare samplers in OMPL's own planners, with OMPL's Benchmark, on the same tasks.
 
 MAP is what `plan` takes; without any, the bundled maps are used ({maps}).
-`@FILE` stands for the arguments in FILE, one a line: so a benchmark can be kept in a file.
+`@FILE` stands for the arguments in FILE, one a line: a benchmark can be kept in a file.
 
-The output folder holds, when all is done:
+At the end the output folder holds:
 
-  logs/MAP_N.log    OMPL's log of each task, with further properties of the runs
+  logs/MAP_N.log    OMPL's log of each task, with additional properties of the runs
   benchmark.db      SQLite, for Planner Arena and OMPL's scripts
   summary.json      medians and ratios with 95 % intervals, over all tasks and by kind of map
-  summary.md        the same to be read
+  summary.md        the same as a report
   *.png, *.pdf      plots
 
-Exit status: 0 done, 1 some tasks failed, 2 bad input, 130 interrupted (go on with --resume).
+Exit status: 0 done, 1 some tasks failed, 2 bad input, 130 interrupted (continue with --resume).
 """
 
 
@@ -57,22 +58,22 @@ def add_benchmark_parser(commands: Any) -> None:
         "--tasks-per-map",
         type=int,
         metavar="N",
-        help="at most N of each map, spread over its list (default: all; 4 random ones)",
+        help="at most N tasks of each map, spread over its list (default: all; 4 random ones)",
     )
     tasks.add_argument(
         "--radius", type=float, default=0.0, metavar="R", help="radius of the robot (default: 0)"
     )
     add_map_options(tasks)
 
-    contest = parser.add_argument_group("what is compared")
-    contest.add_argument(
+    comparison = parser.add_argument_group("comparison")
+    comparison.add_argument(
         "--planners",
         type=_names,
         default=defaults.planners,
         metavar="A,B",
         help=f"OMPL's names (default: {','.join(defaults.planners)})",
     )
-    contest.add_argument(
+    comparison.add_argument(
         "--samplers",
         type=_names,
         default=defaults.samplers,
@@ -80,32 +81,32 @@ def add_benchmark_parser(commands: Any) -> None:
         help="uniform (OMPL's own), learned, corridor (around a grid search's path), straight-line "
         f"(default: {','.join(defaults.samplers)})",
     )
-    contest.add_argument(
+    comparison.add_argument(
         "--heatmap-dir",
         action="append",
         default=[],
         type=_named_folder,
         metavar="NAME=DIR",
-        help="a further sampler NAME, which draws from heat maps of any origin: "
-        "DIR/MAP_N.npy or .png for task N of each map, from 0; may be repeated",
+        help="another sampler NAME, with heat maps of any origin: DIR/MAP_N.npy or .png for task N "
+        "of each map, from 0; may be repeated",
     )
-    contest.add_argument(
+    comparison.add_argument(
         "--model",
         action="append",
         default=[],
         type=_model,
         metavar="[NAME=]FILE",
-        help="exported model of the learned sampler (default: the bundled one); with a name, a "
-        "further sampler NAME that draws from this model; may be repeated",
+        help="exported model of the learned sampler (default: the bundled one); with a name, "
+        "another sampler NAME with the heat maps of this model; may be repeated",
     )
-    add_sampler_options(contest)
-    contest.add_argument(
+    add_sampler_options(comparison)
+    comparison.add_argument(
         "--range",
         type=float,
         metavar="R",
         help="longest edge of all planners that have it (default: OMPL's choice)",
     )
-    contest.add_argument(
+    comparison.add_argument(
         "--set",
         nargs="+",
         action="extend",
@@ -114,36 +115,50 @@ def add_benchmark_parser(commands: Any) -> None:
         help="call a setter of a planner: RRTstar.rewire_factor=1.2 is setRewireFactor(1.2)",
     )
 
-    effort = parser.add_argument_group("how much")
+    effort = parser.add_argument_group("effort")
     effort.add_argument(
         "--runs",
         type=int,
         default=defaults.runs,
         metavar="N",
-        help=f"of each planner with each sampler on each task (default: {defaults.runs})",
+        help=f"runs of each planner with each sampler on each task (default: {defaults.runs})",
     )
     effort.add_argument(
         "--time",
         type=float,
         default=defaults.time,
         metavar="S",
-        help=f"limit of a run in seconds (default: {defaults.time})",
+        help=f"time limit of a run, seconds (default: {defaults.time})",
     )
     effort.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="of OMPL and of the draws (default: 0)"
+        "--seed",
+        type=int,
+        default=0,
+        metavar="N",
+        help="seed of OMPL, of the samples and of random tasks (default: 0)",
     )
     effort.add_argument(
         "--jobs",
         type=int,
         default=_cores(),
         metavar="N",
-        help="tasks at a time, each in a process (default: the number of cores)",
+        help="tasks that run at a time, each in a process (default: the number of cores)",
     )
 
     output = parser.add_argument_group("output")
     output.add_argument("--output", required=True, metavar="DIR", help="folder of the results")
     output.add_argument(
-        "--resume", action="store_true", help="go on in a folder: only tasks without a log are run"
+        "--resume",
+        action="store_true",
+        help="continue the benchmark of the folder: only tasks without a log are run",
+    )
+    output.add_argument(
+        "--within",
+        type=int,
+        default=defaults.within,
+        metavar="P",
+        help="report and plots show the time until a path is within P percent of the best known "
+        f"cost (default: {defaults.within})",
     )
 
 
@@ -167,6 +182,28 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0))
 
 
+def _settings(args: argparse.Namespace) -> Settings:
+    folders, models = dict(args.heatmap_dir), dict(args.model)
+    additional = [name for name in models if name not in args.samplers]
+    if LEARNED in additional:
+        raise ConfigError(
+            f"--model {models[LEARNED]}: the learned sampler is not among the samplers"
+        )
+    return Settings(
+        planners=args.planners,
+        samplers=(*args.samplers, *additional, *folders),
+        runs=args.runs,
+        time=args.time,
+        range=args.range,
+        parameters=parse_parameters(args.set),
+        sampler_options=sampler_options(args),
+        models=models,
+        heatmap_dirs=folders,
+        radius=args.radius,
+        within=args.within,
+    )
+
+
 def _benchmark(args: argparse.Namespace) -> int:
     from ..benchmarking.benchmark import Benchmark, write_results
     from ..benchmarking.tasks import select_tasks
@@ -177,27 +214,7 @@ def _benchmark(args: argparse.Namespace) -> int:
             f"warning: {args.jobs} jobs share {_cores()} cores, all times will be too long",
             file=sys.stderr,
         )
-    folders, models = dict(args.heatmap_dir), dict(args.model)
-    further = [name for name in models if name not in args.samplers]
-    if LEARNED in further:
-        raise ConfigError(
-            f"--model {models[LEARNED]}: the learned sampler is not among the samplers"
-        )
-    settings = Settings(
-        planners=args.planners,
-        samplers=(*args.samplers, *further, *folders),
-        runs=args.runs,
-        time=args.time,
-        range=args.range,
-        parameters=parse_parameters(args.set),
-        uniform_fraction=args.uniform_fraction,
-        adaptation=args.adaptation,
-        sharpness=args.sharpness,
-        models=models,
-        heatmap_dirs=folders,
-        radius=args.radius,
-        seed=args.seed,
-    )
+    settings = _settings(args)
     tasks = select_tasks(
         args.maps, args.tasks, args.tasks_per_map, args.radius, args.seed, map_options(args)
     )

@@ -33,8 +33,8 @@ def finite_number(name: str, value: float, least: float) -> float:
 
 def positive_number(name: str, value: float) -> float:
     """Return a number above 0 as a float; arguments and errors as for :func:`finite_number`."""
-    number = finite_number(name, value, 0.0)
-    if number == 0:
+    number = _to_float(value)
+    if not (isfinite(number) and number > 0):
         raise ConfigError(f"{name} must be above 0, got {value!r}")
     return number
 

@@ -14,7 +14,7 @@ from cbagan_ompl.map_generators.randomization import randomized_map
 from cbagan_ompl.maps.grid_map import GridMap
 from cbagan_ompl.maps.loading import bundled_folder, bundled_maps
 
-SCRIPT = Path(__file__).resolve().parents[2] / "benchmarks" / "make_bundled_maps.py"
+SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "make_bundled_maps.py"
 
 
 @pytest.fixture(scope="module")

@@ -1,16 +1,16 @@
-"""What a model paints on maps that it has not seen, how long that takes, and what errors cost.
+"""Heat maps of a model on maps that it has not seen: connectivity, time, and the cost of errors.
 
-    python benchmarks/unseen_maps.py MAPS/png/*.png --tasks MAPS/tasks.csv \
+    python benchmarks/studies/unseen_maps.py MAPS/png/*.png --tasks MAPS/tasks.csv \
         --json benchmarks/results/unseen_maps_ompl_2.0.1.json
 
 Three parts, each over all tasks:
 
-* whether the region joins start and goal, 8-connected in free space, as the network left it and
-  after the repair; its share of free space;
+* whether the region connects start and goal (8-connectivity), before and after the repair, and its
+  fraction of free space;
 * inference and repair, medians in milliseconds on one thread, beside one call of a SAGAN of the
   paper's size at the same resolution;
-* RRT with heat maps that are wrong on purpose: time to its first path and share of solved tasks,
-  next to OMPL's own sampler in turns.
+* RRT with heat maps that are wrong on purpose: time to the first path and fraction of solved tasks,
+  in turns with OMPL's own sampler.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def main() -> None:
     args = parser.parse_args()
     predictor = load_model(args.model)
     tasks = select_tasks(args.maps, args.tasks)
-    regions, timings = paint(predictor, tasks)
+    regions, timings = predict_regions(predictor, tasks)
     timings["sagan_ms"] = sagan_ms(int(predictor.record["working_size"]))
     wrong = plan_with_wrong_heatmaps(predictor, tasks, args.runs)
     result = {"ompl": ompl_version(), "tasks": len(tasks), "regions": regions}
@@ -60,20 +60,22 @@ def main() -> None:
         write_json(args.json, result)
 
 
-def paint(
+def predict_regions(
     predictor: Predictor, tasks: list[BenchmarkTask]
 ) -> tuple[dict[str, dict[str, float]], dict[str, float]]:
-    """Connectivity and size of the regions by family, and how long they took."""
+    """Return connectivity and size of the regions by kind of map, and the times of prediction."""
     rows, times = defaultdict(list), defaultdict(list)
     for one in tqdm(tasks, desc="regions"):
-        grid, ends = one.grid, grid_ends(one)
-        predictor.predict(grid, *ends)  # the first call of a size takes longer
-        raw = timed(times["inference_ms"], predictor.predict, grid, *ends, repair=False)
-        kept = raw.connects(*ends)
-        repaired = timed(times["kept_ms" if kept else "repair_ms"], raw.joined, *ends)
-        timed(times["total_ms"], predictor.predict, grid, *ends)
-        share = raw.region.sum() / grid.free.sum()
-        row = (connects(raw, *ends), connects(repaired, *ends), float(share))
+        grid, endpoints = one.grid, endpoints_of(one)
+        predictor.predict(grid, *endpoints)  # the first call of a size takes longer
+        raw = timed(times["inference_ms"], predictor.predict, grid, *endpoints, repair=False)
+        is_connected = raw.connects(*endpoints)
+        repaired = timed(
+            times["kept_ms" if is_connected else "repair_ms"], raw.connected, *endpoints
+        )
+        timed(times["total_ms"], predictor.predict, grid, *endpoints)
+        fraction = raw.region.sum() / grid.free.sum()
+        row = (connects(raw, *endpoints), connects(repaired, *endpoints), float(fraction))
         rows[one.task.family or "all"].append(row)
     rows["all"] = [row for family in rows.values() for row in family]
     names = ("connected", "connected_after_repair", "share_of_free_space")
@@ -85,6 +87,7 @@ def paint(
 
 
 def connects(heatmap: Heatmap, start: NDArray[np.float64], goal: NDArray[np.float64]) -> bool:
+    """Return whether the region contains start and goal and an 8-connected path between them."""
     parts = cv2.connectedComponents(heatmap.region.astype(np.uint8), connectivity=8)[1]
     (u, v), (x, y) = heatmap.grid.to_pixel((start, goal)).astype(int).tolist()
     return bool(parts[v, u] == parts[y, x] > 0)
@@ -97,28 +100,28 @@ def timed(times: list[float], work: Callable[..., Any], *arguments: Any, **optio
     return result
 
 
-def sagan_ms(side: int, calls: int = 5) -> float:
-    """One call of a SAGAN with the paper's number of parameters (weights do not matter)."""
+def sagan_ms(size: int, calls: int = 5) -> float:
+    """Return the time of one call of a SAGAN of the paper's size; its weights do not matter."""
     config = NetworkConfig().variant("sagan")
     module = torch.jit.freeze(torch.jit.script(RegionModel(make_generator(config)).eval()))
-    predictor = Predictor(module, {"working_size": side, "name": "sagan"})
-    free, ends = np.ones((1, side, side), bool), np.array([[10.0, 10.0]])
-    predictor.probabilities(free, ends, ends + side / 2)
+    predictor = Predictor(module, {"working_size": size, "name": "sagan"})
+    free, points = np.ones((1, size, size), bool), np.array([[10.0, 10.0]])
+    predictor.probabilities(free, points, points + size / 2)
     times: list[float] = []
     for _ in range(calls):
-        timed(times, predictor.probabilities, free, ends, ends + side / 2)
+        timed(times, predictor.probabilities, free, points, points + size / 2)
     return float(np.median(times))
 
 
-def grid_ends(one: BenchmarkTask) -> Endpoints:
+def endpoints_of(one: BenchmarkTask) -> Endpoints:
     return one.grid.check_task(one.task.start, one.task.goal)
 
 
 def wrong_heatmaps(
-    predictor: Predictor, grid: GridMap, ends: Endpoints, rng: np.random.Generator
+    predictor: Predictor, grid: GridMap, endpoints: Endpoints, rng: np.random.Generator
 ) -> dict[str, NDArray[np.float32]]:
-    """Values of heat maps that are wrong on purpose."""
-    values = predictor.predict(grid, *ends).values
+    """Return the values of heat maps that are wrong on purpose."""
+    values = predictor.predict(grid, *endpoints).values
     height, width = grid.shape
     rows, columns = np.nonzero(grid.free)
     pixel = np.zeros(grid.shape, np.float32)
@@ -137,12 +140,12 @@ def wrong_heatmaps(
 def plan_with_wrong_heatmaps(
     predictor: Predictor, tasks: list[BenchmarkTask], runs: int
 ) -> dict[str, dict[str, float]]:
-    """Planning time and success of RRT by the kind of heat map, inference not counted."""
+    """Return planning time, without inference, and success of RRT by the kind of heat map."""
     rng = np.random.default_rng(0)
     first, solved = defaultdict(list), defaultdict(list)
     for one in tqdm(tasks, desc="wrong heat maps"):
-        grid, ends = one.grid, grid_ends(one)
-        maps = wrong_heatmaps(predictor, grid, ends, rng)
+        grid, endpoints = one.grid, endpoints_of(one)
+        maps = wrong_heatmaps(predictor, grid, endpoints, rng)
         solvers = {"uniform": partial(plan, sampler="uniform")}
         for kind, values in maps.items():
             if (values[grid.free] > 0).any():
@@ -151,7 +154,7 @@ def plan_with_wrong_heatmaps(
         for seed in range(runs):
             for kind, solver in solvers.items():
                 results[kind].append(
-                    solver(grid, *ends, planner="RRT", range=RANGE, time=TIME, seed=seed)
+                    solver(grid, *endpoints, planner="RRT", range=RANGE, time=TIME, seed=seed)
                 )
         for kind, done in results.items():
             own = np.median(first_paths(results["uniform"]))
@@ -168,15 +171,18 @@ def plan_with_wrong_heatmaps(
 
 
 def first_paths(done: list[PlanResult]) -> list[float]:
-    """Seconds of planning to the first path; the limit for runs without one."""
+    """Return the planning time to the first path, seconds; the limit for runs without one."""
     return [r.first_solution_s if r.solved else TIME for r in done]
 
 
 def print_result(result: dict[str, Any]) -> None:
-    print("| maps | tasks | joined | after repair | share of free space |\n|---|---|---|---|---|")
+    print("| maps | tasks | connected | after repair | fraction of free space |")
+    print("|---|---|---|---|---|")
     for family, row in result["regions"].items():
-        shares = [row[k] for k in ("connected", "connected_after_repair", "share_of_free_space")]
-        print(f"| {family} | {row['tasks']} | {' | '.join(f'{share:.0%}' for share in shares)} |")
+        fractions = [row[k] for k in ("connected", "connected_after_repair", "share_of_free_space")]
+        print(
+            f"| {family} | {row['tasks']} | {' | '.join(f'{value:.0%}' for value in fractions)} |"
+        )
     print("\nmilliseconds:", {name: round(value, 1) for name, value in result["timings"].items()})
     print("\n| heat map | first path, ratio to OMPL's | solved |\n|---|---|---|")
     for kind, row in result["wrong_heatmaps"].items():

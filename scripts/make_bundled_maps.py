@@ -1,6 +1,6 @@
 """Draw the bundled maps, cbagan_ompl/maps/bundled/*.png, and write their tasks.csv.
 
-Run it from anywhere, ``python benchmarks/make_bundled_maps.py``; it always writes the same maps.
+Run it from anywhere, ``python scripts/make_bundled_maps.py``; it always writes the same maps.
 """
 
 from __future__ import annotations
@@ -52,13 +52,13 @@ TASKS = {
 
 
 def draw(name: str) -> NDArray[np.bool_]:
-    """The map of a family that is bundled."""
+    """Return a bundled map."""
     rng = np.random.default_rng([SEED, *name.encode("ascii")])
     return MAP_GENERATORS[name](rng, *SIZES.get(name, (256, 256)))
 
 
 def tasks_csv() -> str:
-    """The content of tasks.csv: the centres of the chosen pixels."""
+    """Return the content of tasks.csv: the centres of the chosen pixels."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(("map", "start_x", "start_y", "goal_x", "goal_y"))
@@ -73,8 +73,8 @@ def main() -> None:
     FOLDER.mkdir(exist_ok=True)
     for name in TASKS:
         # One bit a pixel: the whole set is a few kilobytes.
-        picture = draw(name).astype(np.uint8) * 255
-        cv2.imwrite(str(FOLDER / f"{name}.png"), picture, [cv2.IMWRITE_PNG_BILEVEL, 1])
+        image = draw(name).astype(np.uint8) * 255
+        cv2.imwrite(str(FOLDER / f"{name}.png"), image, [cv2.IMWRITE_PNG_BILEVEL, 1])
     (FOLDER / "tasks.csv").write_text(tasks_csv(), encoding="utf-8")
     print(f"{len(TASKS)} maps and their tasks written to {FOLDER}")
 

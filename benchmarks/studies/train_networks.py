@@ -1,10 +1,10 @@
-r"""Train the paper's networks with the same budget and gather their scores.
+r"""Train the paper's networks with the same budget and collect their scores.
 
-    python benchmarks/train_networks.py DATASET --output runs \
+    python benchmarks/studies/train_networks.py DATASET --output runs \
         --json benchmarks/results/networks.json
 
-CBAGAN and SAGAN are trained with three seeds, the ablations with one. Each run takes a folder of
-its own; runs that are complete are not repeated, one that was interrupted goes on.
+CBAGAN and SAGAN are trained with three seeds, the ablations with one. Each run has a folder of
+its own; complete runs are not repeated, an interrupted one is resumed.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def main() -> None:
 
 
 def is_complete(folder: Path) -> bool:
-    """Whether a run has come to its end, where the scores on the test tasks are added."""
+    """Return whether a run is complete: at its end it adds the scores on the test tasks."""
     return (folder / BEST).exists() and "test" in load_checkpoint(folder / BEST)
 
 

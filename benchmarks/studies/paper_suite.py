@@ -1,12 +1,11 @@
 """Tasks of the paper's data set for `cbagan-ompl benchmark`.
 
-    python benchmarks/paper_suite.py DATASET --tasks 100 --output paper-suite
+    python benchmarks/studies/paper_suite.py DATASET --tasks 100 --output paper-suite
     cbagan-ompl benchmark @paper-suite/tasks.args @benchmarks/suites/paper.args --output results
 
-DATASET is the folder of the published (map, point, ROI) set. Some of its test tasks are drawn by
-a seed and written as tasks.csv, and the stored predictions that come with the set, if they do, as
-heat maps of a sampler "sagan-stored". tasks.args has the arguments that tell the benchmark of all
-this.
+DATASET is the folder of the published (map, point, ROI) set. Some of its test tasks are chosen at
+random and written as tasks.csv. The stored predictions, where they come with the set, are written
+as heat maps of a sampler "sagan-stored". tasks.args has the arguments of the benchmark.
 """
 
 from __future__ import annotations
@@ -27,8 +26,8 @@ COLUMNS = ("map", "start_x", "start_y", "goal_x", "goal_y", "family")
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("dataset", metavar="DATASET", type=Path)
-    parser.add_argument("--tasks", type=int, default=100, help="how many (default: 100)")
-    parser.add_argument("--seed", type=int, default=0, help="chooses the tasks (default: 0)")
+    parser.add_argument("--tasks", type=int, default=100, help="number of tasks (default: 100)")
+    parser.add_argument("--seed", type=int, default=0, help="of the choice of tasks (default: 0)")
     parser.add_argument("--output", type=Path, required=True, metavar="DIR")
     args = parser.parse_args()
     dataset = load_dataset(args.dataset)
@@ -37,8 +36,8 @@ def main() -> None:
     # The benchmark numbers the tasks of each map in the order of the file.
     chosen = chosen[np.argsort(dataset.test.map_of[chosen], kind="stable")]
     names = map_names(dataset, chosen)
-    ends = [(*dataset.test.start[i].tolist(), *dataset.test.goal[i].tolist()) for i in chosen]
-    rows = [(name, *points, family(name)) for name, points in zip(names, ends, strict=True)]
+    endpoints = [(*dataset.test.start[i].tolist(), *dataset.test.goal[i].tolist()) for i in chosen]
+    rows = [(name, *points, original(name)) for name, points in zip(names, endpoints, strict=True)]
     args.output.mkdir(parents=True, exist_ok=True)
     write_csv(args.output / "tasks.csv", COLUMNS, rows)
     arguments = [str(args.dataset / "maps" / f"{name}.png") for name in dict.fromkeys(names)]
@@ -50,22 +49,22 @@ def main() -> None:
 
 
 def map_names(dataset: Dataset, chosen: np.ndarray) -> list[str]:
-    """The name of the map of each task."""
+    """Return the name of the map of each task."""
     return [f"map_{dataset.map_numbers[k]}" for k in dataset.test.map_of[chosen]]
 
 
-def family(name: str) -> str:
-    """The original that a map is a copy of: ten each, in the order of their numbers."""
+def original(name: str) -> str:
+    """Return the original that a map is a copy of: ten each, in the order of their numbers."""
     return f"original {int(name.removeprefix('map_')) // 10}"
 
 
 def write_heatmaps(dataset: Path, folder: Path, chosen: np.ndarray, names: list[str]) -> None:
-    """The stored region of each task as an array that ``--heatmap-dir`` reads."""
+    """Write the stored region of each task as an array that ``--heatmap-dir`` reads."""
     folder.mkdir(exist_ok=True)
     regions = load_predictions(dataset / STORED, dataset, "test")
-    for place, (i, name) in enumerate(zip(chosen, names, strict=True)):
-        number = place - names.index(name)
-        # Outside the region a little is left, so that every free pixel can be drawn.
+    for row, (i, name) in enumerate(zip(chosen, names, strict=True)):
+        number = row - names.index(name)
+        # Outside the region a little is left, so that every free pixel can be sampled.
         values = np.where(regions[i], 1.0, 1e-4).astype(np.float32)
         np.save(folder / f"{name}_{number}.npy", values)
 

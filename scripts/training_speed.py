@@ -1,8 +1,8 @@
 """How long a training step takes: memory format and precision, next to each other in one run.
 
-    python benchmarks/training_speed.py [--device cuda] [--batch-size 32] [--threads 1]
+    python scripts/training_speed.py [--device cuda] [--batch-size 32] [--threads 1]
 
-The rows take turns, so that all of them meet the same disturbances; the ratio is to the first row.
+The rows take turns, so that all of them meet the same disturbances. Ratios are to the first row.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def step(
     device: torch.device,
     precision: str,
 ) -> float:
-    """Seconds of one forward and backward pass."""
+    """Return the duration of one forward and backward pass, seconds."""
     began = time.perf_counter()
     with torch.autocast(device.type, torch.bfloat16, enabled=precision == "bfloat16"):
         image = generator(*inputs)

@@ -1,10 +1,10 @@
-"""Which label leads planners best? Planning with true labels as heat maps, on generated maps.
+"""Which label guides planners best? Planning with labels as heat maps, on synthetic maps.
 
-    python benchmarks/labels.py --maps 16 --json benchmarks/results/labels.json
+    python benchmarks/studies/labels.py --maps 16 --json benchmarks/results/labels.json
 
-A network can at best paint what it is taught. Here planners draw from labels themselves: from the
-exact ones of several widths (EPSILON of cbagan_ompl.datasets.geodesic_labels), and from the
-paper's, the union of 50 runs of RRT. Ratios are to OMPL's own sampler, geometric means over the
+A network can at best predict the labels that it is trained on. Here planners sample the labels
+themselves: the exact ones of several widths (EPSILON of cbagan_ompl.datasets.geodesic_labels), and
+the paper's, the union of 50 runs of RRT. Ratios are to OMPL's own sampler, geometric means over the
 tasks.
 """
 
@@ -33,7 +33,7 @@ from cbagan_ompl.planning.compat import ompl_version
 EPSILONS = (0.01, 0.02, 0.05, 0.1)
 LONGEST_EDGE, TIME = 20.0, 0.4
 PLANNERS = ("RRT", "RRTstar", "InformedRRTstar")
-# Training draws from part 0, validation and test from parts 1 and 2, the sharpness from part 3.
+# Training uses part 0, validation and test parts 1 and 2, the study of the sharpness part 3.
 PART = 4
 
 
@@ -46,11 +46,11 @@ def main() -> None:
     ratios: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
     seconds: dict[str, list[float]] = defaultdict(list)
     for number in trange(args.maps):
-        world = generate_map_tasks(SyntheticSettings(), PART, number)
-        grid, ends = GridMap(world.maps[0]), (world.start[0], world.goal[0])
-        labels, optimum = labels_of(grid, ends, number, seconds)
+        synthetic = generate_map_tasks(SyntheticSettings(), PART, number)
+        grid, endpoints = GridMap(synthetic.maps[0]), (synthetic.start[0], synthetic.goal[0])
+        labels, optimum = labels_of(grid, endpoints, number, seconds)
         for planner in PLANNERS:
-            measured = partial(median_measure, grid, ends, planner, optimum, args.runs)
+            measured = partial(median_measure, grid, endpoints, planner, optimum, args.runs)
             own = measured(sampler="uniform")
             for name, values in labels.items():
                 heatmap = Heatmap(values, grid)
@@ -67,10 +67,13 @@ def main() -> None:
 
 
 def labels_of(
-    grid: GridMap, ends: tuple[Any, Any], seed: int, seconds: dict[str, list[float]]
+    grid: GridMap, endpoints: tuple[Any, Any], seed: int, seconds: dict[str, list[float]]
 ) -> tuple[dict[str, NDArray[Any]], float]:
-    """The labels of a task by name, and its shortest way; notes what they took."""
-    (u, v), (x, y) = (end.astype(int).tolist() for end in ends)
+    """Return the labels of a task by name, and the length of its shortest path.
+
+    What they took goes into ``seconds``, by the same names.
+    """
+    (u, v), (x, y) = (point.astype(int).tolist() for point in endpoints)
     began = perf_counter()
     from_start, from_goal = distance_field(grid.free, (u, v)), distance_field(grid.free, (x, y))
     exact = perf_counter() - began
@@ -80,7 +83,7 @@ def labels_of(
         labels[name] = geodesic_label(from_start, from_goal, (x, y), epsilon)
         seconds[name].append(exact)
     began = perf_counter()
-    task = grid.check_task(*ends)
+    task = grid.check_task(*endpoints)
     labels["RRT"] = rrt_region(grid, task, RUNS, grid.width * RANGE, ITERATIONS, seed)
     seconds["RRT"].append(perf_counter() - began)
     kept = {name: values for name, values in labels.items() if values.any()}
@@ -88,11 +91,16 @@ def labels_of(
 
 
 def median_measure(
-    grid: GridMap, ends: tuple[Any, Any], planner: str, optimum: float, runs: int, **options: Any
+    grid: GridMap,
+    endpoints: tuple[Any, Any],
+    planner: str,
+    optimum: float,
+    runs: int,
+    **options: Any,
 ) -> float:
-    """Median over the runs: nodes of RRT; time until the path is within 5 % of the others."""
+    """Return the median over the runs: nodes of RRT, time to 5 % of the shortest path of others."""
     results = [
-        plan(grid, *ends, planner=planner, range=LONGEST_EDGE, time=TIME, seed=seed, **options)
+        plan(grid, *endpoints, planner=planner, range=LONGEST_EDGE, time=TIME, seed=seed, **options)
         for seed in range(runs)
     ]
     return float(np.median([measure(result, optimum, TIME) for result in results]))

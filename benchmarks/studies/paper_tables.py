@@ -1,12 +1,12 @@
 """The planning columns of the paper's tables: RRT with OMPL's sampler and with those of models.
 
-    python benchmarks/paper_tables.py DATASET --model cbagan=models/cbagan.pt \
+    python benchmarks/studies/paper_tables.py DATASET --model cbagan=models/cbagan.pt \
         --model sagan=models/sagan.pt --json benchmarks/results/paper_tables.json
 
 DATASET is the folder of the published (map, point, ROI) set. First RRT runs many times on three
-tasks: of the first three of its ten original maps (maps 0, 10 and 20) the first task in test.csv
+tasks: of the first three of the ten original maps (maps 0, 10 and 20) the first task in test.csv
 whose straight line is blocked. Then it runs once on every test task. The samplers take turns, with
-the same parameters and seeds. Times are of planning alone, inference stands beside them.
+the same parameters and seeds. Planning times exclude inference, which is given apart.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def main() -> None:
 
 
 def three_tasks(dataset: Dataset) -> list[int]:
-    """Numbers of the test tasks that the rule above picks."""
+    """Return the numbers of the three test tasks that the rule above chooses."""
     tasks, chosen = dataset.test, []
     for original in range(3):
         of_map = np.flatnonzero(np.array(dataset.map_numbers)[tasks.map_of] == original * COPIES)
@@ -74,14 +74,17 @@ def three_tasks(dataset: Dataset) -> list[int]:
 
 
 def straight_line_is_free(tasks: Tasks, i: int) -> bool:
-    ends = np.stack((tasks.start[i], tasks.goal[i])).astype(np.float64)
-    return GridMap(tasks.free[i]).path_is_free(ends)
+    endpoints = np.stack((tasks.start[i], tasks.goal[i])).astype(np.float64)
+    return GridMap(tasks.free[i]).path_is_free(endpoints)
 
 
 def run_all(
     tasks: Tasks, jobs: list[tuple[int, int]], predictors: dict[str, Predictor | None]
 ) -> dict[str, Runs]:
-    """Measures of every sampler on every (task, seed), shape (jobs,); NaN for runs in vain."""
+    """Return the measures of every sampler for every (task, seed), shape (jobs,).
+
+    Runs without a path have NaN.
+    """
     rows: dict[str, list[list[float]]] = {name: [] for name in predictors}
     names = list(predictors)
     grids = {i: GridMap(tasks.free[i]) for i, _ in jobs}
@@ -110,7 +113,7 @@ def run_all(
 
 
 def summary(runs: dict[str, Runs]) -> dict[str, Any]:
-    """Medians, and median ratios to the uniform sampler, with bootstrap 95 % intervals."""
+    """Return medians, and median ratios to the uniform sampler, with bootstrap 95 % intervals."""
     return {
         name: {
             "solved": float(np.isfinite(values["nodes"]).mean()),
@@ -122,7 +125,7 @@ def summary(runs: dict[str, Runs]) -> dict[str, Any]:
 
 
 def interval(values: NDArray[np.float64]) -> list[float]:
-    """Median and the ends of its interval; runs in vain count as infinitely long."""
+    """Return the median and its 95 % interval; runs without a path count as infinite."""
     values = np.where(np.isfinite(values), values, np.inf)
     rng = np.random.default_rng(0)
     resamples = np.median(values[rng.integers(len(values), size=(1000, len(values)))], axis=1)

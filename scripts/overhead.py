@@ -1,11 +1,11 @@
-"""What the benchmark runner costs: iterations of RRT* inside and outside of it.
+"""The overhead of the benchmark: iterations of RRT* inside and outside of it.
 
-    python benchmarks/overhead.py
+    python scripts/overhead.py
 
 The same task, time limit and parameters, once by a plain SimpleSetup and once by the runner, with
-its counting of collision checks, its look at the best cost and OMPL's progress data. The two take
-turns, and the plain one runs as long as the other one did: OMPL's Benchmark looks at the clock now
-and then only, and iterations become slower as the tree grows.
+its count of collision checks, its records of the best cost and OMPL's progress data. The two take
+turns, and the plain one runs as long as the other one did: OMPL's Benchmark checks the time now and
+then only, and iterations become slower as the tree grows.
 """
 
 from __future__ import annotations

@@ -1,0 +1,346 @@
+"""Write the tables of the documentation from the result files in benchmarks/results.
+
+    python scripts/results_tables.py
+    python scripts/results_tables.py --summaries results/summary.json
+
+Without options it writes one Markdown table a file into docs/results/generated, where the pages of
+the documentation include them. With ``--summaries`` it prints the table of planners and samplers
+for the ``summary.json`` of benchmarks of your own, one for each version of OMPL.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from cbagan_ompl.common.files import make_folder, write_atomically
+from cbagan_ompl.common.markdown import table
+
+ROOT = Path(__file__).resolve().parents[1]
+RESULTS = ROOT / "benchmarks" / "results"
+OUTPUT = ROOT / "docs" / "results" / "generated"
+VERSIONS = ("2.0.1", "1.7.0")
+#: What the bundled model is trained on.
+BUNDLED_LABEL = "exact, 5%"
+
+#: Columns of the tables of planners and samplers: ratios to OMPL's own sampler, by their names.
+RATIOS = {
+    "nodes": "nodes",
+    "within_5_percent_s": "to 5 %",
+    "within_5_percent_total_s": "with inference",
+}
+RATIOS_WITH_FIRST = {
+    "nodes": "nodes",
+    "first_solution_s": "first path",
+    "first_solution_total_s": "with inference",
+    "within_5_percent_s": "to 5 %",
+    "within_5_percent_total_s": "with inference",
+}
+
+Json = Mapping[str, Any]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument(
+        "--output", type=Path, default=OUTPUT, metavar="DIR", help="folder of the tables"
+    )
+    parser.add_argument(
+        "--summaries", nargs="+", type=Path, metavar="FILE", help="print the table of these instead"
+    )
+    args = parser.parse_args()
+    if args.summaries is not None:
+        print(planners_table([read(path) for path in args.summaries], RATIOS_WITH_FIRST))
+        return
+    make_folder(args.output)
+    for name, make in TABLES.items():
+        write_atomically(args.output / f"{name}.md", make() + "\n")
+
+
+def read(path: str | Path) -> Json:
+    """Return the content of a JSON file; a relative path begins in benchmarks/results."""
+    content: Json = json.loads((RESULTS / path).read_text(encoding="utf-8"))
+    return content
+
+
+def planners_table(
+    summaries: Sequence[Json],
+    ratios: Mapping[str, str] = RATIOS,
+    samplers: Sequence[str] | None = None,
+) -> str:
+    """Return the table of planners and samplers, for several versions of OMPL side by side.
+
+    Args:
+        summaries: the ``summary.json`` of a benchmark, once for each version of OMPL.
+        ratios: the measures that are shown, and the names of their columns.
+        samplers: that are shown, in this order; all but OMPL's own by default.
+    """
+    header = ["planner", "sampler"]
+    rows: dict[tuple[str, str], list[str]] = {}
+    for summary in summaries:
+        header += [f"{summary['ompl_version']}: solved", *ratios.values()]
+        own = {row["planner"]: row for row in summary["overall"] if not row["ratios"]}
+        for row in summary["overall"]:
+            if row["ratios"] and (samplers is None or row["sampler"] in samplers):
+                cells = rows.setdefault((row["planner"], row["sampler"]), [])
+                cells += ratio_cells(row, own[row["planner"]], ratios)
+    planners = list(dict.fromkeys(planner for planner, _ in rows))
+    order = list(samplers or dict.fromkeys(sampler for _, sampler in rows))
+    names = sorted(rows, key=lambda name: (planners.index(name[0]), order.index(name[1])))
+    return table(header, [[*name, *rows[name]] for name in names])
+
+
+def ratio_cells(row: Json, own: Json, ratios: Mapping[str, str]) -> list[str]:
+    """Return how many runs were solved, by OMPL's own sampler and by this one, and the ratios."""
+    shown = [
+        # Where most runs of both end at the limit, a ratio of limits would say nothing.
+        "-"
+        if row["censored"][measure] >= 0.5 <= own["censored"][measure]
+        else interval_of(row["ratios"][measure])
+        for measure in ratios
+    ]
+    return [f"{own['success']:.0%} / {row['success']:.0%}", *shown]
+
+
+def interval_of(interval: Mapping[str, float | None]) -> str:
+    median, low, high = (ratio_text(interval[key]) for key in ("median", "low", "high"))
+    return f"{median} [{low}, {high}]"
+
+
+def ratio_text(value: float | None) -> str:
+    """Return a ratio; a missing one is infinite: more than half of the runs did not get there."""
+    return "∞" if value is None or math.isinf(value) else f"{value:.2f}"
+
+
+def real_maps() -> str:
+    summaries = [read(f"real_maps_ompl_{version}.json") for version in VERSIONS]
+    return planners_table(summaries, samplers=("learned", "corridor"))
+
+
+def paper_tasks() -> str:
+    summaries = [read(f"paper_suite_ompl_{version}.json") for version in VERSIONS]
+    return planners_table(
+        summaries, samplers=("learned", "paper-trained", "sagan-stored", "corridor")
+    )
+
+
+def bundled_maps() -> str:
+    return planners_table([read("bundled_ompl_2.0.1.json")], RATIOS_WITH_FIRST)
+
+
+def unseen_maps_connectivity() -> str:
+    regions = dict(read("unseen_maps_ompl_2.0.1.json")["regions"])
+    regions["all"] = regions.pop("all")  # last
+    rows = {
+        "connected": "connected",
+        "after repair": "connected_after_repair",
+        "fraction of free space": "share_of_free_space",
+    }
+    return table(
+        ["", *regions],
+        [
+            [name, *(f"{region[key]:.0%}" for region in regions.values())]
+            for name, key in rows.items()
+        ],
+    )
+
+
+def unseen_maps_inference() -> str:
+    timings = read("unseen_maps_ompl_2.0.1.json")["timings"]
+    rows = {
+        "one prediction with the bundled model": "total_ms",
+        "of which the network": "inference_ms",
+        "of which the check that the region is connected": "kept_ms",
+        "repair, where the region is not connected": "repair_ms",
+        "a SAGAN of the paper's size at the same resolution": "sagan_ms",
+    }
+    return table(
+        ["", "median time"], [[name, f"{timings[key]:.1f} ms"] for name, key in rows.items()]
+    )
+
+
+def wrong_heatmaps() -> str:
+    versions = [read(f"unseen_maps_ompl_{version}.json")["wrong_heatmaps"] for version in VERSIONS]
+    header = [text for version in VERSIONS for text in (f"{version}: first path", "solved")]
+    lines = []
+    for kind in versions[0]:
+        line = ["OMPL's own sampler" if kind == "uniform" else kind]
+        for rows in versions:
+            line += [f"{rows[kind]['first_path_ratio']:.2f}", f"{rows[kind]['solved']:.1%}"]
+        lines.append(line)
+    return table(["heat map", *header], lines)
+
+
+def labels() -> str:
+    planners = ("RRT", "RRTstar", "InformedRRTstar")
+    header = ["label", "RRT: nodes", "RRTstar: to 5 %", "InformedRRTstar: to 5 %", "time for one"]
+    rows = []
+    for label, values in read("labels.json")["ratios"].items():
+        name = "union of RRT" if label == "RRT" else label.replace("%", " %")
+        name = f"**{name}**" if label == BUNDLED_LABEL else name
+        shown = (f"{values[planner]:.2f}" for planner in planners)
+        rows.append([name, *shown, f"{values['label_ms']:.0f} ms"])
+    return table(header, rows)
+
+
+def sharpness() -> str:
+    columns = {
+        "RRT": "RRT: nodes",
+        "RRTstar": "RRTstar: to 5 %",
+        "InformedRRTstar": "InformedRRTstar: to 5 %",
+    }
+    ratios = read("sharpness.json")["median_ratios"]
+    return table(
+        ["exponent", *columns.values()],
+        [
+            [f"{float(exponent):g}", *(f"{ratios[planner][exponent]:.2f}" for planner in columns)]
+            for exponent in ratios["RRT"]
+        ],
+    )
+
+
+def ablation() -> str:
+    results = read("worlds_ablation.json")
+    names = {
+        "full": "the whole",
+        "supervised": "without the adversarial part",
+        "no-fronts": "without the distance fields",
+    }
+    tests = {name: results[key]["test"] for key, name in names.items()}
+    rows = [
+        [name, f"{scores['iou']:.3f}", f"{scores['dice']:.3f}", connected(scores)]
+        for name, scores in tests.items()
+    ]
+    return table(["network", "IoU", "Dice", "start connected to goal"], rows)
+
+
+def connected(scores: Json) -> str:
+    return f"{100 * scores['connectivity']:.1f} %"
+
+
+def regions() -> str:
+    predictions, noise = read("evaluation.json")["predictions"], read("label_noise.json")
+    names = {
+        "cbagan": "**`cbagan`** (recipe `best`, 26 epochs)",
+        "sagan-stored": "SAGAN as published with the data (stored images, 21.2 M)",
+        "two labels": "*one label as a prediction of another*",
+        "majority": "*the majority of five labels as a prediction of another*",
+        "all free space": "all free space",
+        "straight line": "a band around the straight line",
+    }
+    rows = []
+    for key, name in names.items():
+        if key in noise:
+            scores = (f"*{noise[key][score]:.3f}*" for score in ("iou", "dice"))
+            rows.append([name, *scores, "", "", ""])
+        else:
+            rows.append([name, *region_cells(predictions[key])])
+    header = ["", "IoU", "Dice", "start connected to goal", "parameters", "inference"]
+    return table(header, rows)
+
+
+def region_cells(prediction: Json) -> list[str]:
+    scores, (low, high) = prediction["scores"], prediction["intervals"]["iou"]
+    parameters, inference = prediction.get("parameters"), prediction.get("inference_ms")
+    return [
+        f"{scores['iou']:.3f} [{low:.3f}, {high:.3f}]",
+        f"{scores['dice']:.3f}",
+        connected(scores),
+        "" if parameters is None else f"{parameters:,}",
+        "" if inference is None else f"{inference:.1f} ms",
+    ]
+
+
+def label_noise() -> str:
+    names = {
+        "two labels": "two labels of one task",
+        "majority": "the majority of five labels and another one",
+        "own labels and the first": "a published label and one of ours",
+        "own labels and the majority": "a published label and the majority of ours",
+    }
+    noise = read("label_noise.json")
+    rows = [
+        [name, f"{noise[key]['iou']:.3f}", f"{noise[key]['dice']:.3f}"]
+        for key, name in names.items()
+    ]
+    return table(["agreement of", "IoU", "Dice"], rows)
+
+
+def networks() -> str:
+    trained = read("networks.json")["test"]
+    predictions = read("evaluation.json")["predictions"]
+    tasks = read("paper_tables.json")["all_test_tasks"]
+    # Key of networks.json and of the other files, spatial and channel attention, name.
+    rows = (
+        ("cbagan", "cbagan-10-epochs", "yes", "yes", "CBAGAN"),
+        ("sa", "cbagan-sa", "yes", "no", ""),
+        ("ca", "cbagan-ca", "no", "yes", ""),
+        ("none", "cbagan-none", "no", "no", ""),
+        ("sagan", "sagan", "", "", "SAGAN (self-attention)"),
+    )
+    lines = []
+    for network, model, spatial, channel, name in rows:
+        seeds = trained[network].values()
+        iou, dice = (
+            ", ".join(f"{scores[score]:.{digits}f}" for scores in seeds)
+            for score, digits in (("iou", 4), ("dice", 3))
+        )
+        inference = f"{tasks[model]['inference_ms'][0]:.1f} ms"
+        parameters = f"{predictions[model]['parameters']:,}"
+        nodes = nodes_of(tasks[model])
+        lines.append([spatial, channel, name, parameters, iou, dice, nodes, inference])
+    header = ["spatial", "channel", "network", "parameters", "IoU", "Dice", "RRT nodes"]
+    return table([*header, "inference"], lines)
+
+
+def nodes_of(samples: Json) -> str:
+    median, low, high = samples["nodes"]
+    return f"{median:.0f} [{low:.0f}, {high:.0f}]"
+
+
+def paper_tables() -> str:
+    results = read("paper_tables.json")
+    names = {"uniform": "OMPL's", "sagan": "SAGAN", "cbagan": "CBAGAN", "worlds": "bundled model"}
+    groups = {name.split(",")[0]: samplers for name, samplers in results["maps"].items()}
+    groups[f"all {results['all_test_tasks']['tasks']:,} test tasks"] = results["all_test_tasks"]
+    rows = []
+    for group, samplers in groups.items():
+        for sampler, name in names.items():
+            values = samplers[sampler]
+            planning, inference = (values[key][0] for key in ("planning_ms", "inference_ms"))
+            rows.append(
+                [
+                    group if sampler == "uniform" else "",
+                    name,
+                    nodes_of(values),
+                    f"{planning:.1f} ms",
+                    f"{inference:.1f} ms" if inference else "",
+                ]
+            )
+    return table(["", "sampler", "nodes", "planning", "inference"], rows)
+
+
+#: What makes each table, by the name of its file.
+TABLES: dict[str, Callable[[], str]] = {
+    "unseen_maps_connectivity": unseen_maps_connectivity,
+    "unseen_maps_inference": unseen_maps_inference,
+    "real_maps": real_maps,
+    "wrong_heatmaps": wrong_heatmaps,
+    "sharpness": sharpness,
+    "labels": labels,
+    "ablation": ablation,
+    "regions": regions,
+    "label_noise": label_noise,
+    "networks": networks,
+    "paper_tables": paper_tables,
+    "paper_tasks": paper_tasks,
+    "bundled_maps": bundled_maps,
+}
+
+
+if __name__ == "__main__":
+    main()

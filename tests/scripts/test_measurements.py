@@ -1,0 +1,38 @@
+"""The scripts that make figures and measure speeds run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import pytest
+from helpers.scripts import run_script
+
+ROOT = Path(__file__).resolve().parents[2]
+SCRIPTS = ROOT / "scripts"
+
+
+def test_overhead() -> None:
+    printed = run_script(SCRIPTS / "overhead.py", "--rounds", "1", "--time", "0.1")
+    assert "iterations per second inside" in printed
+
+
+def test_startup_time() -> None:
+    pytest.importorskip("torch")
+    printed = run_script(SCRIPTS / "startup_time.py", str(ROOT), str(ROOT), "--runs", "1")
+    rows = [line.split() for line in printed.splitlines()[1:]]
+    assert [row[-4] for row in rows][-3:] == ["uniform", "corridor", "learned"]
+    assert all(0.1 < float(row[-1]) < 10 for row in rows)
+
+
+def test_gallery(tmp_path: Path) -> None:
+    pytest.importorskip("torch")
+    run_script(SCRIPTS / "gallery.py", "--output", str(tmp_path / "regions.png"))
+    assert cv2.imread(str(tmp_path / "regions.png")).std() > 10
+
+
+def test_training_speed() -> None:
+    pytest.importorskip("torch")
+    words = ("--batch-size", "1", "--size", "32", "--repeats", "1", "--device", "cpu")
+    printed = run_script(SCRIPTS / "training_speed.py", *words)
+    assert printed.count("ms a step") == 4
