@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+import zlib
 from pathlib import Path
 
 import cv2
@@ -17,3 +19,9 @@ def write_image(path: Path, pixels: np.ndarray, *flags: int) -> Path:
     assert done
     path.write_bytes(data.tobytes())
     return path
+
+
+def png_header(width: int, height: int) -> bytes:
+    """Return the first chunk of a PNG file."""
+    chunk = b"IHDR" + struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n\0\0\0\r" + chunk + struct.pack(">I", zlib.crc32(chunk))

@@ -3,22 +3,15 @@
 from __future__ import annotations
 
 import struct
-import zlib
 
 import cv2
 import numpy as np
 import pytest
-from helpers.images import GRAYS, SHAPE, write_image
+from helpers.images import GRAYS, SHAPE, png_header, write_image
 
 from cbagan_ompl.errors import MapError
 from cbagan_ompl.maps.grid_map import GridMap
 from cbagan_ompl.maps.raw_map import MAX_SIDE
-
-
-def png_header(width, height):
-    """The first chunk of a PNG file."""
-    chunk = b"IHDR" + struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
-    return b"\x89PNG\r\n\x1a\n\0\0\0\r" + chunk + struct.pack(">I", zlib.crc32(chunk))
 
 
 @pytest.mark.parametrize("suffix", [".png", ".bmp", ".pgm", ".jpg", ".jpeg", ".PNG", ".Jpg"])

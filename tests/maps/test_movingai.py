@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from helpers.images import png_header
 
 from cbagan_ompl.errors import MapError
 from cbagan_ompl.maps.grid_map import GridMap
