@@ -3,8 +3,8 @@
 Data flows one way: map file -> :class:`GridMap` -> :class:`Predictor` -> :class:`Heatmap` ->
 sampler -> OMPL's planner, unmodified -> path. See the README for a first example.
 
-Names that need ompl or torch are imported when they are first used: a heat map of one's own needs
-no torch, training needs no ompl.
+Every name is imported when it is first used: a heat map of one's own needs no torch, training needs
+no ompl, and the command line starts at once.
 """
 
 from __future__ import annotations
@@ -23,14 +23,12 @@ from .errors import (
     PlannerError,
     TaskError,
 )
-from .maps.grid_map import GridMap
-from .maps.loading import bundled_maps
-from .maps.tasks import Task, load_tasks, tasks_of
-from .sampling.heatmap import Heatmap
-from .sampling.options import Adaptation, SamplerOptions
 
 if TYPE_CHECKING:
     from .inference.predictor import Predictor, load_model
+    from .maps.grid_map import GridMap
+    from .maps.loading import bundled_maps
+    from .maps.tasks import Task, load_tasks, tasks_of
     from .planning.attach import Attachment, attach
     from .planning.hooks import reached_planners
     from .planning.ompl_samplers import (
@@ -43,6 +41,8 @@ if TYPE_CHECKING:
     from .planning.plan_result import PlanResult
     from .planning.validity import GridMotionValidator, GridValidityChecker
     from .plotting import save_figure
+    from .sampling.heatmap import Heatmap
+    from .sampling.options import Adaptation, SamplerOptions
 
 __version__ = "0.2.0"
 
@@ -82,6 +82,9 @@ __all__ = [
 
 _HOMES = {
     "inference.predictor": ("Predictor", "load_model"),
+    "maps.grid_map": ("GridMap",),
+    "maps.loading": ("bundled_maps",),
+    "maps.tasks": ("Task", "load_tasks", "tasks_of"),
     "planning.attach": ("Attachment", "attach"),
     "planning.hooks": ("reached_planners",),
     "planning.plan": ("plan",),
@@ -94,6 +97,8 @@ _HOMES = {
     ),
     "planning.validity": ("GridMotionValidator", "GridValidityChecker"),
     "plotting": ("save_figure",),
+    "sampling.heatmap": ("Heatmap",),
+    "sampling.options": ("Adaptation", "SamplerOptions"),
 }
 _LAZY = {name: module for module, names in _HOMES.items() for name in names}
 

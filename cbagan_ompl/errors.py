@@ -2,9 +2,25 @@
 
 from __future__ import annotations
 
+from reprlib import Repr
+
+# Characters of a message: what lies between its two ends is left out beyond that.
+_LONGEST_MESSAGE, _TAIL = 900, 300
+
+# Integers with more bits are not written out: Python refuses to convert very long ones to text.
+_LONGEST_INTEGER = 128
+
 
 class CbaganOmplError(Exception):
-    """Root of every exception that this package raises on purpose."""
+    """Root of every exception that this package raises on purpose.
+
+    Args:
+        message: what was wrong, with the value, and what to do. Long ones are shortened, and
+            characters that a terminal would act on are written as escapes.
+    """
+
+    def __init__(self, message: object = "") -> None:
+        super().__init__(_plain(str(message)))
 
 
 class MapError(CbaganOmplError):
@@ -37,3 +53,47 @@ class ConfigError(CbaganOmplError):
 
 class MissingDependencyError(CbaganOmplError):
     """An optional package that the called function needs is not installed."""
+
+
+def show(value: object) -> str:
+    """Return a value as messages show it: like ``repr``, but short whatever the value is.
+
+    Example:
+        >>> show("maze.png"), len(show(list(range(10**6)))) < 100
+        ("'maze.png'", True)
+    """
+    return _SHORT.repr(value)
+
+
+class _Short(Repr):
+    """A ``repr`` that takes little time and space, and raises nothing."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxlevel, self.maxstring, self.maxother = 3, 200, 200
+
+    def repr_int(self, x: int, level: int) -> str:
+        if x.bit_length() > _LONGEST_INTEGER:
+            return f"<an integer of {x.bit_length()} bits>"
+        return repr(x)
+
+    def repr_instance(self, x: object, level: int) -> str:
+        try:
+            return super().repr_instance(x, level)
+        except Exception:  # whatever the class of the value does
+            return f"<{type(x).__name__}>"
+
+
+_SHORT = _Short()
+
+
+def _plain(message: str) -> str:
+    if len(message) > _LONGEST_MESSAGE:
+        message = f"{message[: _LONGEST_MESSAGE - _TAIL]} [...] {message[-_TAIL:]}"
+    if message.isprintable():
+        return message
+    return "".join(c if c.isprintable() or c == "\n" else _escape(c) for c in message)
+
+
+def _escape(character: str) -> str:
+    return ascii(character)[1:-1]

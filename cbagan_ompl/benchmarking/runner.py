@@ -13,7 +13,8 @@ from typing import cast
 
 from tqdm import tqdm
 
-from ..common.parallel import fork_server, interrupts_held
+from ..common.parallel import fork_server
+from ..common.signals import interrupts_held
 from ..planning.heatmap_sources import LEARNED
 from .worker import Job, run_job
 

@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import os
 import sys
+import traceback
 from collections.abc import Sequence
 
 from .. import __version__
-from ..common.files import check_folder
+from ..common.files import check_folder, reason
+from ..common.signals import Terminated
 from ..errors import CbaganOmplError
 from .benchmark import add_benchmark_parser
 from .dataset import add_dataset_parser
 from .evaluate import add_evaluate_parser
 from .plan import add_plan_parser
 from .train import add_export_parser, add_train_parser
+
+#: Exit statuses beside 0 and 1: bad input, and what is our own fault (EX_SOFTWARE of sysexits.h).
+BAD_INPUT, INTERNAL_ERROR = 2, 70
+INTERRUPTED, NO_READER, TERMINATED = 130, 141, 143
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -24,8 +31,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: what follows the program's name; ``sys.argv[1:]`` by default.
 
     Returns:
-        The exit status: 0 done, 1 no path found, 2 bad input, 130 interrupted, 141 nobody reads
-        the output.
+        The exit status: 0 done, 1 no path found, 2 bad input or a file that cannot be written, 70
+        an error of this package's own, 130 interrupted, 141 nobody reads the output, 143
+        terminated.
     """
     # Figures are files: whatever backend a notebook or a screen asks for may not be there.
     os.environ["MPLBACKEND"] = "agg"
@@ -34,16 +42,39 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         check_folder(getattr(args, "json", None))
         return int(args.run(args))
-    except CbaganOmplError as error:
-        print(f"cbagan-ompl {args.command}: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
-        return 130
     except BrokenPipeError:
         # The reader of our output has gone, as in "| head -1": files are written by then.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 141
+        return NO_READER
+    except KeyboardInterrupt as error:
+        is_terminated = isinstance(error, Terminated)
+        hint = "; go on with the same command and --resume" if hasattr(args, "resume") else ""
+        print(("terminated" if is_terminated else "interrupted") + hint, file=sys.stderr)
+        return TERMINATED if is_terminated else INTERRUPTED
+    except Exception as error:
+        if args.debug:
+            traceback.print_exc()
+        status, text = _explain(error)
+        print(f"cbagan-ompl {args.command}: {text}", file=sys.stderr)
+        return status
+
+
+def _explain(error: Exception) -> tuple[int, str]:
+    """Return the exit status of an error, and what to say of it."""
+    if isinstance(error, CbaganOmplError):
+        return BAD_INPUT, str(error)
+    if isinstance(error, OSError) and error.errno in _OF_THE_SYSTEM:
+        file = f"{error.filename}: " if error.filename else ""
+        return BAD_INPUT, str(CbaganOmplError(f"{file}{reason(error)}"))
+    said = CbaganOmplError(f"{type(error).__name__}: {error}")
+    return INTERNAL_ERROR, (
+        f"this is an error of cbagan-ompl itself: {said}; please report it with what the same "
+        "command prints with --debug"
+    )
+
+
+# What a full or protected disk, and not a mistake of ours, is the cause of.
+_OF_THE_SYSTEM = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO}
 
 
 def _bind_points(arguments: Sequence[str]) -> list[str]:
@@ -69,4 +100,19 @@ def _make_parser() -> argparse.ArgumentParser:
     add_train_parser(commands)
     add_export_parser(commands)
     add_evaluate_parser(commands)
+    _add_debug_option(parser, default=False)
     return parser
+
+
+def _add_debug_option(parser: argparse.ArgumentParser, default: object) -> None:
+    """Add ``--debug`` to a parser and to those of its commands."""
+    parser.add_argument(
+        "--debug",
+        action="store_true",
+        default=default,
+        help="print the traceback of an error that ends the command",
+    )
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for command in action.choices.values():
+                _add_debug_option(command, argparse.SUPPRESS)

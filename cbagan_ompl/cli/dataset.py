@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -218,11 +217,7 @@ def _generate(args: argparse.Namespace) -> int:
         seed=args.seed,
     )
     check_at_least("jobs", args.jobs, 1)
-    try:
-        generate(Path(args.output), settings, args.jobs, args.resume)
-    except KeyboardInterrupt:
-        print("interrupted; continue with the same command and --resume", file=sys.stderr)
-        return 130
+    generate(Path(args.output), settings, args.jobs, args.resume)
     print(f"{settings.maps * settings.tasks} tasks written to {args.output}")
     if args.json is not None:
         write_json(args.json, describe(import_dataset(Path(args.output))))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
@@ -174,26 +173,22 @@ def _train(args: argparse.Namespace) -> int:
 
     if args.threads is not None:
         torch.set_num_threads(args.threads)
-    try:
-        with _source(args, config) as source:
-            if is_leading_process():
-                values = source.description()
-                print(
-                    f"{values['train_tasks']} training tasks an epoch, "
-                    f"{values['test_tasks']} for testing"
-                )
-            result = train(
-                source,
-                config,
-                args.output,
-                resume=args.resume,
-                start_from=args.start_from,
-                device=args.device,
-                tensorboard=args.tensorboard,
+    with _source(args, config) as source:
+        if is_leading_process():
+            values = source.description()
+            print(
+                f"{values['train_tasks']} training tasks an epoch, "
+                f"{values['test_tasks']} for testing"
             )
-    except KeyboardInterrupt:
-        print("interrupted; go on with the same command and --resume", file=sys.stderr)
-        return 130
+        result = train(
+            source,
+            config,
+            args.output,
+            resume=args.resume,
+            start_from=args.start_from,
+            device=args.device,
+            tensorboard=args.tensorboard,
+        )
     if not is_leading_process():
         return 0
     _print_scores(result)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import stat
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from ..errors import CbaganOmplError, ConfigError, MapError
 
@@ -21,35 +22,73 @@ def reason(error: BaseException) -> str:
     return str(getattr(error, "strerror", None) or error)
 
 
-def read_bytes(path: Path, error_class: type[CbaganOmplError] = MapError) -> bytes:
-    """Return the content of a file.
+#: Largest file that is read whole unless its reader says otherwise, in bytes.
+MAX_BYTES = 2**30
+
+#: Largest text file that is parsed line by line or as a tree, in bytes.
+MAX_TEXT_BYTES = 2**26
+
+
+def read_bytes(
+    path: Path, error_class: type[CbaganOmplError] = MapError, limit: int = MAX_BYTES
+) -> bytes:
+    """Return the content of a regular file: the one way in for every file that is read whole.
 
     Args:
         path: the file.
         error_class: what to raise.
+        limit: most bytes that are read.
 
     Raises:
-        CbaganOmplError: of that class; it is missing, a folder, or may not be read.
+        CbaganOmplError: of that class; it is missing, a folder, a device or a pipe, larger than
+            ``limit``, or may not be read.
     """
+    with open_regular(path, error_class) as file:
+        size = os.fstat(file.fileno()).st_size
+        try:
+            data = file.read(limit + 1) if size <= limit else b""
+        except OSError as error:
+            raise error_class(f"cannot read {path}: {reason(error)}") from error
+    # Some files, such as those of the kernel, say that they are empty and are not.
+    if max(size, len(data)) > limit:
+        raise error_class(
+            f"cannot read {path}: it has more than the {limit / 2**20:g} MiB that a file of this "
+            "kind may have"
+        )
+    return data
+
+
+def open_regular(path: Path, error_class: type[CbaganOmplError] = MapError) -> BinaryIO:
+    """Open a regular file for reading; arguments and errors as for :func:`read_bytes`."""
     try:
-        return path.read_bytes()
+        # Without waiting: a pipe that nobody writes to would be waited for without end.
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     # A path with a NUL character is a ValueError.
     except (OSError, ValueError) as error:
         raise error_class(f"cannot read {path}: {reason(error)}") from error
+    mode = os.fstat(descriptor).st_mode
+    if not stat.S_ISREG(mode):
+        os.close(descriptor)
+        kind = "a folder" if stat.S_ISDIR(mode) else "a device or a pipe"
+        raise error_class(f"cannot read {path}: it is {kind}, not a file")
+    return os.fdopen(descriptor, "rb")
 
 
-def read_text(path: Path, error_class: type[CbaganOmplError] = MapError) -> str:
+def read_text(
+    path: Path, error_class: type[CbaganOmplError] = MapError, limit: int = MAX_TEXT_BYTES
+) -> str:
     """Return the content of a text file in UTF-8, with or without byte order mark.
 
     Args:
         path: the file.
         error_class: what to raise.
+        limit: most bytes that are read.
 
     Raises:
-        CbaganOmplError: of that class; it cannot be read, or is no text.
+        CbaganOmplError: of that class; it cannot be read (see :func:`read_bytes`), or is no text.
     """
     try:
-        return read_bytes(path, error_class).decode("utf-8-sig")
+        return read_bytes(path, error_class, limit).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise error_class(f"{path} is no text file in UTF-8: {error}") from error
 
@@ -101,8 +140,12 @@ def write_atomically(
     target = Path(path)
     temporary = target.with_name(f"{target.name}.tmp")
     try:
-        temporary.write_bytes(data.encode("utf-8") if isinstance(data, str) else data)
-        os.replace(temporary, target)
+        try:
+            temporary.write_bytes(data.encode("utf-8") if isinstance(data, str) else data)
+            os.replace(temporary, target)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
     except (OSError, ValueError) as error:
         raise error_class(f"cannot write {target}: {reason(error)}") from error
 

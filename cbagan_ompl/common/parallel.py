@@ -3,46 +3,19 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
-from multiprocessing import Pipe, active_children, forkserver, get_context, resource_tracker
-from multiprocessing.connection import Connection
+from multiprocessing import active_children, forkserver, get_context, resource_tracker
 from multiprocessing.context import ForkServerContext
-from threading import current_thread, main_thread
 from typing import Any, TypeVar
 
 from tqdm import tqdm
 
 from ..errors import DatasetError
+from .signals import interrupts_held
 
 T = TypeVar("T")
-
-
-@contextmanager
-def interrupts_held() -> Iterator[Connection]:
-    """Hold an interrupt back until the end of the block.
-
-    The yielded connection is ready to read once an interrupt has come.
-
-    A wait for the connection may miss an interrupt that another thread takes, until the next one.
-
-    A mask of signals would not do: it holds for one thread, and an interrupt that any other one
-    takes, such as that of a progress bar, is raised in the main thread all the same.
-    """
-    came, sender = Pipe(duplex=False)
-    with came, sender:
-        if current_thread() is not main_thread():
-            yield came  # only the main thread gets interrupts
-            return
-        before = signal.signal(signal.SIGINT, lambda *_: sender.send_bytes(b"."))
-        try:
-            yield came
-        finally:
-            signal.signal(signal.SIGINT, before)
-            if came.poll():
-                signal.raise_signal(signal.SIGINT)
 
 
 def fork_server(preload: Sequence[str] = ()) -> ForkServerContext:
@@ -50,7 +23,8 @@ def fork_server(preload: Sequence[str] = ()) -> ForkServerContext:
 
     OMPL, OpenCV and torch have threads, which a fork does not survive. Neither the server nor its
     processes hear the interrupt of a terminal, which is for all processes that it started: they
-    end with the one that made them. To be called and used with :func:`interrupts_held`.
+    end with the one that made them. To be called and used with
+    :func:`.signals.interrupts_held`.
 
     Args:
         preload: modules that the server imports, where it is not there yet.

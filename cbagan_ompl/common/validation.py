@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from importlib import import_module
-from math import isfinite, nan
+from math import inf, isfinite, nan
 from operator import index
-from typing import SupportsFloat, SupportsIndex
+from typing import SupportsIndex
 
-from ..errors import ConfigError, MissingDependencyError
+import numpy as np
+
+from ..errors import ConfigError, MissingDependencyError, show
 
 
 def finite_number(name: str, value: float, least: float) -> float:
@@ -27,7 +29,7 @@ def finite_number(name: str, value: float, least: float) -> float:
     """
     number = _to_float(value)
     if not (isfinite(number) and number >= least):
-        raise ConfigError(f"{name} is a finite number of at least {least:g}, got {value!r}")
+        raise ConfigError(f"{name} is a finite number of at least {least:g}, got {show(value)}")
     return number
 
 
@@ -35,27 +37,29 @@ def positive_number(name: str, value: float) -> float:
     """Return a number above 0 as a float; arguments and errors as for :func:`finite_number`."""
     number = _to_float(value)
     if not (isfinite(number) and number > 0):
-        raise ConfigError(f"{name} must be above 0, got {value!r}")
+        raise ConfigError(f"{name} must be above 0, got {show(value)}")
     return number
 
 
-def whole_number(name: str, value: SupportsIndex, least: int) -> int:
+def whole_number(name: str, value: SupportsIndex, least: int, most: int = 2**63) -> int:
     """Return a whole number as an int.
 
     Args:
         name: of the option, for the message.
         value: an int or a NumPy integer; a truth value is none.
         least: smallest number that is allowed.
+        most: largest number that is allowed.
 
     Raises:
-        ConfigError: the value is no whole number, or below ``least``.
+        ConfigError: the value is no whole number, or out of range.
     """
     try:
         number = index(value)
-    except TypeError:
+    except Exception:  # whatever the class of the value raises
         number = least - 1
-    if number < least or isinstance(value, bool):
-        raise ConfigError(f"{name} is a whole number of at least {least}, got {value!r}")
+    if number < least or number > most or isinstance(value, bool):
+        limit = f" and at most {most}" if number > most else ""
+        raise ConfigError(f"{name} is a whole number of at least {least}{limit}, got {show(value)}")
     return number
 
 
@@ -80,8 +84,8 @@ def check_fraction(name: str, value: float) -> None:
 
 
 def is_finite_number(value: object) -> bool:
-    """Return whether a value is a finite real number."""
-    return isinstance(value, SupportsFloat) and isfinite(value)
+    """Return whether a value is a finite real number: no text, no truth value, no array."""
+    return isfinite(_to_float(value))
 
 
 def require(package: str, extra: str) -> None:
@@ -113,9 +117,14 @@ def require_torch() -> None:
 
 
 def _to_float(value: object) -> float:
-    if isinstance(value, str | bool):
+    """Return a number as a float; NaN where it is none, infinity where it is too large for one."""
+    if isinstance(value, str | bytes | bool | np.bool_):
+        return nan
+    if isinstance(value, np.ndarray) and value.ndim > 0:
         return nan
     try:
         return float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
+    except OverflowError:
+        return inf
+    except Exception:  # whatever the class of the value raises
         return nan

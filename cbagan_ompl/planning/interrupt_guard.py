@@ -1,4 +1,4 @@
-"""Keeping exceptions and Ctrl-C inside OMPL's callbacks, where leaving would abort the process."""
+"""Keeping exceptions and signals inside OMPL's callbacks, where leaving would abort the process."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import signal
 from collections.abc import Callable
 from types import TracebackType
 from typing import Any
+
+from ..common.signals import ENDING, Terminated
 
 
 class InterruptGuard:
@@ -37,7 +39,11 @@ class InterruptGuard:
         return guarded
 
     def __enter__(self) -> InterruptGuard:
-        self._before = signal.signal(signal.SIGINT, self._interrupt)
+        before = {number: signal.getsignal(number) for number in ENDING}
+        # Signals that the process ignores, or leaves to the system, stay as they are.
+        self._before = {number: kept for number, kept in before.items() if callable(kept)}
+        for number in self._before:
+            signal.signal(number, self._interrupt)
         return self
 
     def __exit__(
@@ -46,7 +52,8 @@ class InterruptGuard:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        signal.signal(signal.SIGINT, self._before)
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
         # Forgotten first: callbacks know the guard, and the exception knows what they work for.
         kept, self._error = self._error, None
         try:
@@ -55,5 +62,6 @@ class InterruptGuard:
         finally:
             del kept
 
-    def _interrupt(self, *_: object) -> None:
-        self._error = self._error or KeyboardInterrupt()
+    def _interrupt(self, number: int, _: object) -> None:
+        ended = Terminated() if number == signal.SIGTERM else KeyboardInterrupt()
+        self._error = self._error or ended

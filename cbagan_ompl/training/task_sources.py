@@ -9,7 +9,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from ..common.parallel import fork_server, interrupts_held
+from ..common.parallel import fork_server
+from ..common.signals import interrupts_held
 from ..common.validation import check_at_least, require
 from ..datasets.dataset import Dataset, Tasks
 from ..datasets.synthetic import (

@@ -51,7 +51,7 @@ def test_interrupt_keeps_finished_tasks(map_folder: Path, tmp_path: Path) -> Non
     status, said = interrupted(words, lambda: any(folder.glob("logs/*.log")))
     assert status == 130, said
     assert "Traceback" not in said
-    assert said.endswith("interrupted\n")
+    assert said.endswith("interrupted; go on with the same command and --resume\n")
     logs = list(folder.glob("logs/*"))
     assert 1 <= len(logs) < 30
     for log in logs:

@@ -1,0 +1,75 @@
+"""YAML as users write it: no aliases, no deep nesting, and errors of one kind."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import yaml
+
+from ..errors import CbaganOmplError, show
+
+#: Largest YAML file that is read, in bytes: PyYAML takes seconds for a megabyte.
+MAX_YAML_BYTES = 2**18
+
+# Levels of lists and mappings in each other.
+_MAX_DEPTH = 20
+
+# What PyYAML says of text that it cannot parse has several lines; the first ones say it.
+_LONGEST_REASON = 300
+
+
+def parse_yaml(
+    text: bytes | str, name: str, error_class: type[CbaganOmplError]
+) -> Any:  # whatever the text holds
+    """Return the value of a YAML text: numbers, texts, lists and mappings.
+
+    Aliases (``*name``) are refused, because a few lines of them can stand for gigabytes.
+
+    Args:
+        text: in UTF-8 where it is bytes.
+        name: of the file or option, for the message.
+        error_class: what to raise.
+
+    Raises:
+        CbaganOmplError: of that class; the text is no YAML, or of a kind that is refused.
+
+    Example:
+        >>> from cbagan_ompl import ConfigError
+        >>> parse_yaml("epochs: 20", "recipe.yaml", ConfigError)
+        {'epochs': 20}
+    """
+    try:
+        return yaml.load(text, _Loader)
+    except Exception as error:  # PyYAML lets whatever Python raises for odd values through
+        raise error_class(f"{name}: no valid YAML: {_describe(error)}") from error
+
+
+class _Loader(yaml.SafeLoader):
+    """PyYAML's safe loader without aliases, with a limit on the depth."""
+
+    def __init__(self, stream: bytes | str) -> None:
+        super().__init__(stream)
+        self._depth = 0
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        if self.check_event(yaml.AliasEvent):
+            event = self.peek_event()  # type: ignore[no-untyped-call]
+            raise yaml.composer.ComposerError(
+                None, None, f"aliases such as *{event.anchor} are not read", event.start_mark
+            )
+        self._depth += 1
+        if self._depth > _MAX_DEPTH:
+            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
+            raise yaml.composer.ComposerError(
+                None, None, f"nested deeper than {_MAX_DEPTH} levels", mark
+            )
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
+
+
+def _describe(error: Exception) -> str:
+    text = " ".join(str(error).split()) or type(error).__name__
+    if "'\\t'" in text:
+        text += "; indent and separate with blanks, this reader takes no tabs"
+    return text if len(text) <= _LONGEST_REASON else show(text)
