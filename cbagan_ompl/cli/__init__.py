@@ -17,6 +17,7 @@ from ..errors import CbaganOmplError
 from .benchmark import add_benchmark_parser
 from .dataset import add_dataset_parser
 from .evaluate import add_evaluate_parser
+from .parser import Parser
 from .plan import add_plan_parser
 from .train import add_export_parser, add_train_parser
 
@@ -87,7 +88,9 @@ _INPUT_ARGUMENTS = (
 )
 
 # What a full or protected disk, and not a mistake of ours, is the cause of.
-_OF_THE_SYSTEM = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO}
+_OF_THE_SYSTEM = {
+    *(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO),
+}
 
 
 def _bind_points(arguments: Sequence[str]) -> list[str]:
@@ -102,9 +105,7 @@ def _bind_points(arguments: Sequence[str]) -> list[str]:
 
 
 def _make_parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="cbagan-ompl", description="A learned state sampler for OMPL's planners."
-    )
+    parser = Parser(prog="cbagan-ompl", description="A learned state sampler for OMPL's planners.")
     parser.add_argument("--version", action="version", version=f"cbagan-ompl {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     add_plan_parser(commands)
