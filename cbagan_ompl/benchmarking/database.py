@@ -67,7 +67,7 @@ def write_database(logs: Iterable[ExperimentLog], path: Path) -> None:
     try:
         try:
             temporary.unlink(missing_ok=True)
-            _write_tables(logs, temporary)
+            write_tables(logs, temporary)
             os.replace(temporary, path)
         except BaseException:
             temporary.unlink(missing_ok=True)
@@ -76,7 +76,16 @@ def write_database(logs: Iterable[ExperimentLog], path: Path) -> None:
         raise ConfigError(f"cannot write {path}: {reason(error)}") from error
 
 
-def _write_tables(logs: Iterable[ExperimentLog], path: Path) -> None:
+def write_tables(logs: Iterable[ExperimentLog], path: Path) -> None:
+    """Write the tables into a file that does not exist yet.
+
+    Args:
+        logs: the content of the database.
+        path: of the file.
+
+    Raises:
+        sqlite3.Error: the file cannot be written; half of it may be there.
+    """
     with closing(sqlite3.connect(path)) as database:
         # Half a file is thrown away, so nothing has to be kept for a return to its beginning.
         database.execute("PRAGMA journal_mode = OFF")

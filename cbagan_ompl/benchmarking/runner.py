@@ -67,7 +67,7 @@ def _run_jobs(jobs: Sequence[Job], processes: int, show_progress: bool) -> dict[
     running: dict[Connection, _RunningJob] = {}
     failures: dict[str, str] = {}
     rounds = sum(job.settings.runs for job in jobs)
-    bar = tqdm(total=rounds, unit="round", disable=not show_progress, dynamic_ncols=True)
+    bar = tqdm(total=rounds, unit="round", disable=not (show_progress and jobs), dynamic_ncols=True)
     # Outermost: an interrupt is raised only when no process is left that uses the folder.
     with interrupts_held() as interrupted, bar, tempfile.TemporaryDirectory() as folder:
         try:

@@ -242,7 +242,8 @@ class GridMap:
         grown = cv2.dilate((~self.free).astype(np.uint8), np.ones((3, 3), np.uint8))
         gap = cv2.distanceTransform(1 - grown, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
         # The factor covers the rounding of float32 and of the division: 1.1 / 0.1 is 11 pixels.
-        free = gap >= radius / self.resolution * (1 - 1e-6)
+        # The limit keeps absurd radii within the range of float32.
+        free = gap >= min(radius / self.resolution * (1 - 1e-6), 1e30)
         if not free.any():
             raise MapError(
                 f"{self.name}: a robot of radius {radius} fits nowhere on this map "
