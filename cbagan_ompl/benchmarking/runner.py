@@ -14,7 +14,7 @@ from typing import cast
 from tqdm import tqdm
 
 from ..common.files import reason
-from ..common.parallel import fork_server
+from ..common.parallel import fork_server, start_first
 from ..common.signals import interrupts_held
 from ..errors import ConfigError
 from ..planning.heatmap_sources import LEARNED
@@ -74,6 +74,7 @@ def _run_jobs(jobs: Sequence[Job], processes: int, show_progress: bool) -> dict[
             while waiting or running:
                 while waiting and len(running) < processes:
                     started = _RunningJob(waiting.pop(), Path(folder))
+                    started.start(None if running else interrupted)
                     running[started.rounds] = started
                 ready = cast("list[Connection]", wait([*running, interrupted], _POLL_S))
                 if interrupted in ready:
@@ -122,10 +123,17 @@ class _RunningJob:
         self.rounds_left = job.settings.runs
         self._output = folder / job.task.name
         self._output.touch()
-        self.rounds, writer = context.Pipe(duplex=False)
-        self.process = context.Process(target=_work, args=(job, writer, self._output), daemon=True)
-        self.process.start()
-        writer.close()  # the process holds its own copy, whose end is the end of the pipe
+        self.rounds, self._writer = context.Pipe(duplex=False)
+        arguments = (job, self._writer, self._output)
+        self.process = context.Process(target=_work, args=arguments, daemon=True)
+
+    def start(self, interrupted: Connection | None) -> None:
+        """Start the process; an interrupt is waited for with the first one only."""
+        with self._writer:  # the process holds its own copy, whose end is the end of the pipe
+            if interrupted is None:
+                self.process.start()
+            else:
+                start_first(self.process, interrupted)
 
     def rounds_done(self) -> int:
         """Return 1 for a round that is done, 0 when the process has ended."""
