@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from reprlib import Repr
 
-# Characters of a message: what lies between its two ends is left out beyond that.
+# Characters of a message: beyond that its middle is left out.
 _LONGEST_MESSAGE, _TAIL = 900, 300
 
-# Integers with more bits are not written out: Python refuses to convert very long ones to text.
+# Integers with more bits are not written out: Python converts no very long ones to text.
 _LONGEST_INTEGER = 128
 
 

@@ -83,9 +83,9 @@ def test_every_included_table_is_there() -> None:
             assert (page.parent / name).is_file(), name
 
 
-def test_picture_of_the_layers_has_every_package() -> None:
-    picture = (DOCS / "images" / "layers.svg").read_text(encoding="utf-8")
-    names = re.findall(r"font-weight='bold'[^>]*>(\w+)<", picture)
+def test_figure_of_the_layers_has_every_package() -> None:
+    figure = (DOCS / "images" / "layers.svg").read_text(encoding="utf-8")
+    names = re.findall(r"font-weight='bold'[^>]*>(\w+)<", figure)
     package = DOCS.parent / "cbagan_ompl"
     modules = {p.stem for p in package.iterdir() if p.is_dir() or p.suffix == ".py"}
     assert set(names) == {name for name in modules if not name.startswith("_")}

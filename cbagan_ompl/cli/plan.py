@@ -76,7 +76,9 @@ def add_plan_parser(commands: Any) -> None:
     )
     sampler.add_argument("--model", metavar="FILE", help="exported model (default: the bundled)")
     sampler.add_argument(
-        "--heatmap", metavar="FILE", help="draw from this image or .npy instead of a model's"
+        "--heatmap",
+        metavar="FILE",
+        help="sample from this image or .npy instead of a model's heat map",
     )
     add_sampler_options(sampler)
 

@@ -23,7 +23,7 @@ BLUE, VERMILLION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
 #: Obstacles, and space of which nothing is known.
 OBSTACLE, UNKNOWN = "#4d4d4d", "#c3cfdb"
 
-#: Marker, colour and size of the two ends of a task, the same in every figure.
+#: Marker, colour and size of the two endpoints of a task, the same in every figure.
 START_MARK, GOAL_MARK = ("o", GREEN, 10.0), ("*", VERMILLION, 15.0)
 
 

@@ -127,7 +127,7 @@ def write_atomically(
     data: bytes | str,
     error_class: type[CbaganOmplError] = ConfigError,
 ) -> None:
-    """Write a file whole or not at all: no reader, and no interruption, meets half of it.
+    """Write a file whole or not at all, whoever reads it or interrupts this.
 
     Args:
         path: of the file; its folder must exist.

@@ -74,7 +74,7 @@ def check_at_least(name: str, value: int, least: int) -> None:
 
 
 def check_fraction(name: str, value: float) -> None:
-    """Raise if a number is no fraction of anything.
+    """Raise if a number is not between 0 and 1.
 
     Raises:
         ConfigError: it is below 0, above 1 or NaN; the message has the name of the option.

@@ -23,7 +23,7 @@ def parse_yaml(
 ) -> Any:  # whatever the text holds
     """Return the value of a YAML text: numbers, texts, lists and mappings.
 
-    Aliases (``*name``) are refused, because a few lines of them can stand for gigabytes.
+    Aliases (``*name``) are an error, because a few lines of them can stand for gigabytes.
 
     Args:
         text: in UTF-8 where it is bytes.
@@ -31,7 +31,7 @@ def parse_yaml(
         error_class: what to raise.
 
     Raises:
-        CbaganOmplError: of that class; the text is no YAML, or of a kind that is refused.
+        CbaganOmplError: of that class; the text is no YAML, has aliases, or is nested too deeply.
 
     Example:
         >>> from cbagan_ompl import ConfigError

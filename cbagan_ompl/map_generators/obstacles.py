@@ -73,14 +73,14 @@ def bug_trap(rng: np.random.Generator, width: int, height: int) -> Mask:
     a, b = rng.uniform(0.26, 0.29) * width, rng.uniform(0.26, 0.3) * height
     thick, mouth = round(1.6 * unit), round(rng.uniform(2.2, 3.0) * unit)
     lip = rng.uniform(0.75, 0.9) * a
-    hollow = ellipse(free, (x, y), (a - thick, b - thick), power=3.0)
-    free &= hollow | ~ellipse(free, (x, y), (a, b), power=3.0)
+    hollow = ellipse(free, (x, y), (a - thick, b - thick), exponent=3.0)
+    free &= hollow | ~ellipse(free, (x, y), (a, b), exponent=3.0)
     # The channel of the mouth: a block across the wall on the left, with a passage cut out of it.
     channel = x - a + lip / 2
     free &= ~box(free, (channel, y), (lip / 2, mouth / 2 + thick))
     free |= box(free, (channel - unit, y), (lip / 2 + 1.5 * unit, mouth / 2))
     # A passage around the body and in front of its mouth stays clear.
-    clear = ellipse(free, (x, y), (a + 2.5 * unit, b + 2.5 * unit), power=3.0)
+    clear = ellipse(free, (x, y), (a + 2.5 * unit, b + 2.5 * unit), exponent=3.0)
     clear |= box(free, (x - a, y), (5 * unit, 3 * unit))
     scatter_clutter(free, rng, 0.8 * unit, (~free).mean() + rng.uniform(0.07, 0.11), clear)
     return fill_pockets(free)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..errors import MapError
 
-#: Longest side and largest area of a map, in pixels. Larger files are refused before memory is
+#: Longest side and largest area of a map, in pixels. Larger files are an error before memory is
 #: spent on them: a learned plan takes about 140 bytes a pixel.
 MAX_SIDE = 16384
 MAX_PIXELS = 2**26

@@ -102,7 +102,7 @@ class AdaptiveMixture:
     def on_exhausted(self) -> None:
         """Note that the tree covers whatever the heat map offers.
 
-        That is how a tree looks that was cleared meanwhile, so its nodes are counted now and then.
+        This also happens after the tree was cleared, so its nodes are counted now and then.
         """
         self._exhausted_count += 1
         if self._exhausted_count > self._tree.node_count:

@@ -29,7 +29,7 @@ class HeatmapSampler:
     Attributes:
         heatmap: what is sampled.
         rng: the generator of the samples, and of whatever else belongs to the same run.
-        chance: returns a number in [0, 1) at each call, drawn from it.
+        chance: returns a random number of ``rng`` in [0, 1) at each call.
 
     Args:
         heatmap: what to sample.
