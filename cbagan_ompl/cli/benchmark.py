@@ -30,7 +30,9 @@ At the end the output folder holds:
   summary.md        the same as a report
   *.png, *.pdf      plots
 
-Exit status: 0 done, 1 some tasks failed, 2 bad input, 130 interrupted (continue with --resume).
+Exit status: 0 done, 1 some tasks failed, 2 bad input or a file that cannot be written, 70 an error
+of cbagan-ompl itself (--debug prints its traceback), 130 interrupted, 143 terminated (continue
+with --resume).
 """
 
 
@@ -52,7 +54,8 @@ def add_benchmark_parser(commands: Any) -> None:
         "--tasks",
         metavar="FILE",
         help="tasks for the maps: .csv (map,start_x,start_y,goal_x,goal_y[,optimal_cost,"
-        "family]) or MovingAI .scen (default: those that come with a map, otherwise random ones)",
+        "family], where family is the kind of map) or MovingAI .scen (default: those that come "
+        "with a map, otherwise random ones)",
     )
     tasks.add_argument(
         "--tasks-per-map",

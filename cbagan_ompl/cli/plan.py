@@ -20,7 +20,10 @@ The map is a PNG, JPG, BMP or PGM image (dark pixels are obstacles), a ROS map_s
 MovingAI .map, or one of the bundled maps: {maps}.
 
 Coordinates are pixels, x right and y down from the upper left corner, or metres in the frame of
-a ROS map. Exit status: 0 solved, 1 no exact solution in time, 2 bad input.
+a ROS map.
+
+Exit status: 0 solved, 1 no exact solution in time, 2 bad input or a file that cannot be written,
+70 an error of cbagan-ompl itself (--debug prints its traceback), 130 interrupted, 143 terminated.
 """
 
 
