@@ -17,6 +17,14 @@ class CbaganOmplError(Exception):
     Args:
         message: what was wrong, with the value, and what to do. Long ones are shortened, and
             characters that a terminal would act on are written as escapes.
+
+    Example:
+        >>> from cbagan_ompl import GridMap
+        >>> try:
+        ...     GridMap.load("bundled:palace")
+        ... except CbaganOmplError as error:
+        ...     print(type(error).__name__, "-", str(error).split(";")[0])
+        MapError - no map 'palace' is bundled
     """
 
     def __init__(self, message: object = "") -> None:

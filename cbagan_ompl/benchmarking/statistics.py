@@ -270,7 +270,12 @@ def ratio_interval(
 
 
 def ratio(values: NDArray[np.float64], baseline: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return quotients; two equal values have the ratio 1, also where both are infinite."""
+    """Return quotients; two equal values have the ratio 1, also where both are infinite.
+
+    Args:
+        values: the dividends, of any shape, in any unit.
+        baseline: the divisors, of the same shape and unit.
+    """
     ones: NDArray[np.float64] = np.ones(values.shape)
     with np.errstate(divide="ignore"):
         return np.divide(values, baseline, out=ones, where=values != baseline)

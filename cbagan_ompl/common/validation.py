@@ -66,6 +66,11 @@ def whole_number(name: str, value: SupportsIndex, least: int, most: int = 2**63)
 def check_at_least(name: str, value: int, least: int) -> None:
     """Raise if a number is too small.
 
+    Args:
+        name: of the option, for the message.
+        value: the number.
+        least: smallest number that is allowed.
+
     Raises:
         ConfigError: it is below ``least``; the message has the name of the option.
     """
@@ -75,6 +80,10 @@ def check_at_least(name: str, value: int, least: int) -> None:
 
 def check_fraction(name: str, value: float) -> None:
     """Raise if a number is not between 0 and 1.
+
+    Args:
+        name: of the option, for the message.
+        value: the number.
 
     Raises:
         ConfigError: it is below 0, above 1 or NaN; the message has the name of the option.

@@ -128,6 +128,10 @@ class GridMap:
         Raises:
             MapError: the file is missing, unreadable, truncated, empty or of an unknown kind.
             ConfigError: an unknown option, or one with a value that makes no sense.
+
+        Example:
+            >>> GridMap.load("bundled:maze")
+            GridMap('maze', 256 x 256 pixels of 1, image frame, 82% free)
         """
         raw = read_map(path, **options)
         return cls(raw.free, raw.resolution, raw.origin, name=raw.name, unknown=raw.unknown)
@@ -273,6 +277,10 @@ class GridMap:
         self, start: ArrayLike, goal: ArrayLike
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return start and goal as (2,) arrays, or raise if they cannot be planned for.
+
+        Args:
+            start: (x, y), world.
+            goal: (x, y), world.
 
         Raises:
             TaskError: one of them is no point, outside the map or in an obstacle, the two are

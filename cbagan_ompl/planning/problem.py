@@ -49,7 +49,15 @@ def make_setup(grid: GridMap, endpoints: Endpoints, tolerance: float) -> Any:
 
 
 def set_range(planner: Any, range: float) -> bool:
-    """Set the longest edge of a planner, world units; False where it has no such parameter."""
+    """Set the longest edge of a planner.
+
+    Args:
+        planner: an OMPL planner.
+        range: the length, world units.
+
+    Returns:
+        Whether the planner has this parameter.
+    """
     has_range = hasattr(planner, "setRange")
     if has_range:
         planner.setRange(float(range))

@@ -74,7 +74,13 @@ class AdaptiveMixture:
             self.covered = None
 
     def on_new_node(self, x: float, y: float, in_goal: bool) -> None:
-        """Note that the tree has a new node at (x, y), world."""
+        """Note that the tree has a new node.
+
+        Args:
+            x: of the node, world.
+            y: of the node, world.
+            in_goal: whether the node is in the goal region.
+        """
         if not self._is_watching:
             return
         if self._is_in_goal and not in_goal:
