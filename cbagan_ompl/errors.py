@@ -70,7 +70,10 @@ def show(value: object) -> str:
         >>> show("maze.png"), len(show(list(range(10**6)))) < 100
         ("'maze.png'", True)
     """
-    return _SHORT.repr(value)
+    try:
+        return _SHORT.repr(value)
+    except Exception:  # a class that is called like one of Python's own, such as "int"
+        return f"<{type(value).__name__}>"
 
 
 class _Short(Repr):
@@ -85,6 +88,11 @@ class _Short(Repr):
             return f"<an integer of {x.bit_length()} bits>"
         return repr(x)
 
+    def repr_bytes(self, x: bytes, level: int) -> str:
+        return repr(x) if len(x) <= self.maxother else f"<{len(x)} bytes>"
+
+    repr_bytearray = repr_bytes
+
     def repr_instance(self, x: object, level: int) -> str:
         try:
             return super().repr_instance(x, level)
@@ -96,11 +104,17 @@ _SHORT = _Short()
 
 
 def _plain(message: str) -> str:
-    if len(message) > _LONGEST_MESSAGE:
-        message = f"{message[: _LONGEST_MESSAGE - _TAIL]} [...] {message[-_TAIL:]}"
+    message = _shorten(message)
     if message.isprintable():
         return message
-    return "".join(c if c.isprintable() or c == "\n" else _escape(c) for c in message)
+    # Escapes have up to ten characters each.
+    return _shorten("".join(c if c.isprintable() or c == "\n" else _escape(c) for c in message))
+
+
+def _shorten(text: str) -> str:
+    if len(text) <= _LONGEST_MESSAGE:
+        return text
+    return f"{text[: _LONGEST_MESSAGE - _TAIL]} [...] {text[-_TAIL:]}"
 
 
 def _escape(character: str) -> str:

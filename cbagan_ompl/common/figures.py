@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ..errors import ConfigError
-from .files import reason
+from .files import write_atomically
 from .outputs import MADE_BY
 
 # Okabe and Ito's palette, which colour-blind readers can tell apart
@@ -64,7 +65,7 @@ def check_figure_path(path: str | PathLike[str]) -> None:
     Raises:
         ConfigError: the suffix stands for no format that can be written.
     """
-    formats = FigureCanvasAgg.get_supported_filetypes()
+    formats = set(FigureCanvasAgg.get_supported_filetypes()) - {"pgf"}  # which needs TeX
     if Path(path).suffix.lstrip(".").lower() not in formats:
         raise ConfigError(
             f"cannot save a figure as {Path(path).name!r}; its suffix must be one of "
@@ -73,15 +74,20 @@ def check_figure_path(path: str | PathLike[str]) -> None:
 
 
 def write_figure(figure: Figure, path: str | PathLike[str], dots_per_inch: int = 150) -> None:
-    """Save a figure; its suffix chooses the format.
+    """Save a figure whole or not at all; its suffix chooses the format.
+
+    Args:
+        figure: of Matplotlib.
+        path: of the file.
+        dots_per_inch: resolution of formats that have pixels.
 
     Raises:
         ConfigError: the file cannot be written.
     """
-    try:
-        figure.savefig(path, dpi=dots_per_inch, **_signature_of(path))
-    except OSError as error:
-        raise ConfigError(f"cannot write the figure {path}: {reason(error)}") from error
+    buffer = BytesIO()
+    suffix = Path(path).suffix.lstrip(".").lower()
+    figure.savefig(buffer, format=suffix, dpi=dots_per_inch, **_signature_of(path))
+    write_atomically(path, buffer.getvalue())
 
 
 def _signature_of(path: str | PathLike[str]) -> dict[str, Any]:
