@@ -14,7 +14,13 @@ from ..common.validation import check_at_least
 from ..errors import ConfigError
 from ..maps.loading import bundled_maps
 from ..planning.heatmap_sources import LEARNED
-from .options import add_map_options, add_sampler_options, map_options, sampler_options
+from .options import (
+    add_map_options,
+    add_sampler_options,
+    describe_samplers,
+    map_options,
+    sampler_options,
+)
 
 _HELP = """\
 Compare samplers in OMPL's own planners, with OMPL's Benchmark, on the same tasks.
@@ -81,8 +87,7 @@ def add_benchmark_parser(commands: Any) -> None:
         type=_names,
         default=defaults.samplers,
         metavar="A,B",
-        help="uniform (OMPL's own), learned, corridor (around a grid search's path), straight-line "
-        f"(default: {','.join(defaults.samplers)})",
+        help=f"{describe_samplers()} (default: {','.join(defaults.samplers)})",
     )
     comparison.add_argument(
         "--heatmap-dir",

@@ -11,7 +11,13 @@ from ..maps.grid_map import GridMap
 from ..maps.loading import bundled_maps
 from ..maps.tasks import tasks_of
 from ..sampling.heatmap import Heatmap
-from .options import add_map_options, add_sampler_options, map_options, sampler_options
+from .options import (
+    add_map_options,
+    add_sampler_options,
+    describe_samplers,
+    map_options,
+    sampler_options,
+)
 
 _PLAN_HELP = """\
 Plan a path on a map with one of OMPL's planners.
@@ -74,8 +80,7 @@ def add_plan_parser(commands: Any) -> None:
         "--sampler",
         default="learned",
         metavar="NAME",
-        help="learned, uniform (OMPL's own), corridor (around a grid search's path) or "
-        "straight-line (default: learned)",
+        help=f"{describe_samplers()} (default: learned)",
     )
     sampler.add_argument("--model", metavar="FILE", help="exported model (default: the bundled)")
     sampler.add_argument(

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import HeatmapError
-from ..maps.connectivity import label_components
+from ..maps.connectivity import in_one_component, label_components
 from ..maps.grid_map import GridMap
 from ..maps.grid_search import pull_taut, shortest_path
 
@@ -197,9 +197,7 @@ class Heatmap:
         endpoints = np.array((start, goal), dtype=np.float64)
         if not self.grid.is_free(endpoints).all():
             return False
-        first, second = pixel_pair(self.grid.to_pixel(endpoints))
-        label = int(self.components[first[1], first[0]])
-        return label > 0 and label == int(self.components[second[1], second[0]])
+        return in_one_component(self.components, *pixel_pair(self.grid.to_pixel(endpoints)))
 
     def connected(self, start: ArrayLike, goal: ArrayLike) -> Heatmap:
         """Return this heat map with a region that connects start and goal.
