@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from io import BytesIO
 from os import PathLike
 from pathlib import Path
@@ -11,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.text import Text
 
 from ..errors import ConfigError
 from .files import write_atomically
@@ -74,20 +76,31 @@ def check_figure_path(path: str | PathLike[str]) -> None:
 
 
 def write_figure(figure: Figure, path: str | PathLike[str], dots_per_inch: int = 150) -> None:
-    """Save a figure whole or not at all; its suffix chooses the format.
+    """Save a figure, whole or not at all; the suffix chooses the format.
 
     Args:
-        figure: of Matplotlib.
-        path: of the file.
-        dots_per_inch: resolution of formats that have pixels.
+        figure: the figure.
+        path: of the file; its suffix is one that :func:`check_figure_path` lets pass.
+        dots_per_inch: of images.
 
     Raises:
         ConfigError: the file cannot be written.
     """
+    ignore_markup(figure)
     buffer = BytesIO()
-    suffix = Path(path).suffix.lstrip(".").lower()
-    figure.savefig(buffer, format=suffix, dpi=dots_per_inch, **_signature_of(path))
+    kind = Path(path).suffix.lstrip(".").lower()
+    with warnings.catch_warnings():
+        # Scripts that the font does not have are drawn as boxes; crowded panels stay crowded.
+        warnings.filterwarnings("ignore", "Glyph .* missing", UserWarning)
+        warnings.filterwarnings("ignore", "constrained_layout not applied", UserWarning)
+        figure.savefig(buffer, format=kind, dpi=dots_per_inch, **_signature_of(path))
     write_atomically(path, buffer.getvalue())
+
+
+def ignore_markup(figure: Figure) -> None:
+    """Draw all texts of a figure as they are: ``$`` in a name is no formula."""
+    for text in figure.findobj(Text):
+        text.set_parse_math(False)
 
 
 def _signature_of(path: str | PathLike[str]) -> dict[str, Any]:

@@ -8,10 +8,6 @@ from collections.abc import Iterable, Sequence
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Return a table, without a line break at its end.
 
-    Args:
-        header: of the columns.
-        rows: cells as Markdown; line breaks in them become blanks, and "|" is escaped.
-
     Example:
         >>> print(table(["map", "cost"], [["maze", "12"]]))
         | map | cost |
@@ -19,8 +15,8 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
         | maze | 12 |
     """
     lines = [header, ["---"] * len(header), *rows]
-    return "\n".join(f"| {' | '.join(map(_fit_cell, line))} |" for line in lines)
+    return "\n".join(f"| {' | '.join(map(_escape, line))} |" for line in lines)
 
 
-def _fit_cell(text: str) -> str:
-    return " ".join(text.splitlines()).replace("|", "\\|")
+def _escape(cell: str) -> str:
+    return cell.replace("|", r"\|")

@@ -14,11 +14,12 @@ from .files import check_folder, open_regular, write_json
 
 #: What every file of ours says of itself, near its begin or its end.
 MADE_BY = f"cbagan-ompl {__version__}"
-# As it is written in JSON, PNG, PDF, SVG, PostScript and JPEG files: the name alone would also be
-# found in a text about this package.
+# As it is written in JSON, PNG, PDF, SVG, PostScript, JPEG and Markdown files: the name alone would
+# also be found in a text about this package.
 _SIGNATURE = re.compile(
     rb'\A\{\s*"made_by": "cbagan-ompl |Software\0cbagan-ompl |/Creator \(cbagan-ompl '
-    rb"|<dc:title>cbagan-ompl |%%Creator: cbagan-ompl |\xff\xfe\0.cbagan-ompl ",
+    rb"|<dc:title>cbagan-ompl |%%Creator: cbagan-ompl |\xff\xfe\0.cbagan-ompl "
+    rb"|Made by cbagan-ompl ",
     re.DOTALL,
 )
 _SEARCHED = 2**16

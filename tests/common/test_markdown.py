@@ -18,9 +18,7 @@ def test_rows_may_be_an_iterator() -> None:
     ("cell", "line"),
     [
         ("a|b", r"| a\|b |"),
-        ("two\nlines", "| two lines |"),
-        ("two\r\nlines\n", "| two lines |"),
-        ("\u2028", "|  |"),
+        ("|", r"| \| |"),
         ("", "|  |"),
         ("größe", "| größe |"),
     ],
