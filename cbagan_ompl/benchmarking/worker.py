@@ -174,7 +174,7 @@ def _task_parameters(job: Job) -> dict[str, str]:
     (start_x, start_y), (goal_x, goal_y) = job.task.task.start, job.task.task.goal
     return {
         MAP: one_line(job.task.grid.name),
-        # A map of no kind is a kind of its own.
+        # A map without a kind forms a group by itself.
         FAMILY: one_line(job.task.task.family or job.task.grid.name),
         "task INTEGER": str(job.task.number),
         "start_x REAL": f"{start_x:.9g}",

@@ -15,7 +15,13 @@ from ..common.validation import whole_number
 from ..errors import ConfigError, show
 from ..maps.loading import bundled_maps
 from ..planning.heatmap_sources import LEARNED
-from .options import add_map_options, add_sampler_options, map_options, sampler_options
+from .options import (
+    add_map_options,
+    add_sampler_options,
+    describe_samplers,
+    map_options,
+    sampler_options,
+)
 
 # Tasks that run at a time, and characters that a report shows of the command.
 _MOST_JOBS, _LONGEST_COMMAND = 1024, 20_000
@@ -34,7 +40,9 @@ At the end the output folder holds:
   summary.md        the same as a report
   *.png, *.pdf      plots
 
-Exit status: 0 done, 1 some tasks failed, 2 bad input, 130 interrupted (continue with --resume).
+Exit status: 0 done, 1 some tasks failed, 2 bad input or a file that cannot be written, 70 an error
+of cbagan-ompl itself (--debug prints its traceback), 130 interrupted, 143 terminated (continue
+with --resume).
 """
 
 
@@ -56,7 +64,8 @@ def add_benchmark_parser(commands: Any) -> None:
         "--tasks",
         metavar="FILE",
         help="tasks for the maps: .csv (map,start_x,start_y,goal_x,goal_y[,optimal_cost,"
-        "family]) or MovingAI .scen (default: those that come with a map, otherwise random ones)",
+        "family], where family is the kind of map) or MovingAI .scen (default: those that come "
+        "with a map, otherwise random ones)",
     )
     tasks.add_argument(
         "--tasks-per-map",
@@ -82,8 +91,7 @@ def add_benchmark_parser(commands: Any) -> None:
         type=_names,
         default=defaults.samplers,
         metavar="A,B",
-        help="uniform (OMPL's own), learned, corridor (around a grid search's path), straight-line "
-        f"(default: {','.join(defaults.samplers)})",
+        help=f"{describe_samplers()} (default: {','.join(defaults.samplers)})",
     )
     comparison.add_argument(
         "--heatmap-dir",

@@ -26,7 +26,7 @@ BLUE, VERMILLION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
 #: Obstacles, and space of which nothing is known.
 OBSTACLE, UNKNOWN = "#4d4d4d", "#c3cfdb"
 
-#: Marker, colour and size of the two ends of a task, the same in every figure.
+#: Marker, colour and size of the two endpoints of a task, the same in every figure.
 START_MARK, GOAL_MARK = ("o", GREEN, 10.0), ("*", VERMILLION, 15.0)
 
 
@@ -67,7 +67,7 @@ def check_figure_path(path: str | PathLike[str]) -> None:
     Raises:
         ConfigError: the suffix stands for no format that can be written.
     """
-    formats = FigureCanvasAgg.get_supported_filetypes()
+    formats = set(FigureCanvasAgg.get_supported_filetypes()) - {"pgf"}  # which needs TeX
     if Path(path).suffix.lstrip(".").lower() not in formats:
         raise ConfigError(
             f"cannot save a figure as {Path(path).name!r}; its suffix must be one of "
