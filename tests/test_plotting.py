@@ -98,3 +98,27 @@ def test_unknown_space_is_no_obstacle_and_the_margin_is_cut_off() -> None:
     assert (left, right, bottom, top) == (97, 183, 123, 77)
     hidden = make_figure(result, grid, show_tree=False)
     assert "tree" not in legend(hidden)
+
+
+@pytest.mark.parametrize(
+    "name", ["a$b", "$x^$", r"\frac{1}", "two\nlines", "x" * 300, "b\udcff", "地图"]
+)
+@pytest.mark.parametrize("suffix", [".png", ".pdf", ".svg"])
+@pytest.mark.filterwarnings("ignore:Glyph")
+def test_names_are_drawn_as_they_are(name: str, suffix: str, tmp_path: Path) -> None:
+    grid = GridMap(np.ones((20, 20), bool), name=name)
+    result = plan(grid, (2, 2), (15, 15), "RRT", "uniform", time=1, seed=0)
+    path = tmp_path / f"plan{suffix}"
+    save_figure(result, grid, path)
+    assert path.stat().st_size > 5000
+    # As callers save figures of their own.
+    make_figure(result, grid).draw_without_rendering()
+    assert [file.name for file in tmp_path.iterdir()] == [path.name]
+
+
+def test_a_figure_that_cannot_be_written_leaves_nothing(two_walls: GridMap, tmp_path: Path) -> None:
+    result = plan(two_walls, START, GOAL, "RRT", "uniform", time=1, range=20, seed=0)
+    (tmp_path / "plan.png").mkdir()
+    with pytest.raises(ConfigError, match="cannot write"):
+        save_figure(result, two_walls, tmp_path / "plan.png")
+    assert [file.name for file in tmp_path.iterdir()] == ["plan.png"]

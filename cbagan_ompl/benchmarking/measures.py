@@ -50,7 +50,7 @@ BEST_COST = "best cost"
 WITHIN_PERCENT = (10, 5, 2)
 
 # No time, cost or count of a benchmark is larger.
-_LARGEST = 1e300
+_LARGEST = 1e100
 
 # Fractions of the time limit at which the cost is taken.
 _COST_AT = (0.1, 0.25, 0.5, 1.0)

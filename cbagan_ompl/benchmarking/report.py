@@ -8,6 +8,7 @@ from math import isfinite
 from typing import Any
 
 from ..common.markdown import table
+from ..common.text import one_line
 from .settings import BASELINE, Settings
 from .statistics import Interval, Results, Summary, within_key
 
@@ -88,7 +89,9 @@ def markdown(results: Results, conditions: Conditions) -> str:
     if conditions.failures:
         failed = conditions.failures.items()
         parts += ["## Tasks that failed"]
-        parts += ["\n".join(f"- {name}: {output.splitlines()[-1]}" for name, output in failed)]
+        parts += [
+            "\n".join(f"- {name}: {one_line(output.splitlines()[-1])}" for name, output in failed)
+        ]
     return "\n\n".join(part.strip("\n") for part in parts) + "\n"
 
 

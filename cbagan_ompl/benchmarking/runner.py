@@ -16,6 +16,7 @@ from tqdm import tqdm
 from ..common.files import reason
 from ..common.parallel import fork_server, start_first
 from ..common.signals import interrupts_held
+from ..common.text import one_line
 from ..errors import ConfigError
 from ..planning.heatmap_sources import LEARNED
 from .worker import Job, UnwritableLogError, run_job
@@ -103,7 +104,7 @@ def _finish(ended: _RunningJob, failures: dict[str, str], bar: tqdm[None]) -> No
         raise ConfigError(output)
     if output:
         failures[name] = output
-        bar.write(f"task {name} failed: {output.splitlines()[-1]}", sys.stderr)
+        bar.write(f"task {name} failed: {one_line(output.splitlines()[-1])}", sys.stderr)
 
 
 class _RunningJob:

@@ -175,6 +175,10 @@ class GridMap:
     def _of(cls, raw: RawMap) -> GridMap:
         return cls(raw.free, raw.resolution, raw.origin, name=raw.name, unknown=raw.unknown)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out the other maps when the map is sent to another process, or copied."""
+        return {**self.__dict__, "_bare": None, "_inflated": {}}
+
     @property
     def bare(self) -> GridMap:
         """The map before it was inflated; the map itself where it was not, or that one is gone."""

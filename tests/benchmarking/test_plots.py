@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -101,3 +102,18 @@ def test_every_sampler_keeps_its_style() -> None:
     assert [styles["learned"], styles["corridor"]] == list(STYLES[1:3])
     for parts in zip(*((s.color, s.dashes, s.marker, s.hatch) for s in STYLES), strict=True):
         assert len(set(parts)) == len(STYLES)
+
+
+def test_many_kinds_of_maps_fit_on_the_figure_of_ratios(tmp_path: Path) -> None:
+    records = {"RRT_uniform": FIRST_ONLY, "RRT_learned": FIRST_ONLY}
+    logs = [make_log(f"map {i} $", records, optimal_cost=100.0) for i in range(1200)]
+    logs = [
+        replace(log, parameters={**log.parameters, "map family VARCHAR": log.name}) for log in logs
+    ]
+    results = results_of(logs[:3])
+    assert len(results.families) == 3
+    families = dict.fromkeys((log.name for log in logs), results.families["map 0 $"])
+    figure = plots._ratio_figure(replace(results, families=families), "first_solution_total_s", "x")
+    assert figure is not None
+    assert "1140 kinds of map left out" in figure.get_suptitle()
+    plots.write_figure(figure, tmp_path / "ratios.png", 200)

@@ -533,6 +533,7 @@ def test_a_task_that_needs_no_path(map_folder: Path, tmp_path: Path) -> None:
     (tmp_path / "tasks.csv").write_text("map,start_x,start_y,goal_x,goal_y\nwalls,10,10,10.5,10\n")
     words = ["benchmark", str(map_folder / "walls.png"), "--tasks", str(tmp_path / "tasks.csv")]
     words += [*QUICK, "--samplers", "uniform,corridor", "--planners", "RRT,RRTstar"]
+    words += ["--radius", "1"]  # inflated maps go to the processes as well
     assert main([*words, "--output", str(tmp_path / "out")]) == 0
 
 

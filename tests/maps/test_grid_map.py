@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from math import floor, pi
 
 import numpy as np
@@ -284,3 +285,15 @@ def test_world_and_pixel_are_inverse_in_every_frame(height, resolution, origin, 
     # One pixel to the right is as long as the resolution says.
     step = grid.to_world(pixel) - grid.to_world((pixel[0] + 1, pixel[1]))
     np.testing.assert_allclose(np.hypot(*step), resolution, rtol=1e-6, atol=1e-9)
+
+
+def test_inflated_maps_go_to_other_processes():
+    free = np.ones((20, 20), bool)
+    free[5, 5] = False
+    grid = GridMap(free)
+    inflated = grid.inflated(2)
+    for one in (grid, inflated):
+        other = pickle.loads(pickle.dumps(one))
+        assert np.array_equal(other.free, one.free)
+        assert other.name == one.name
+        assert other.bare is other
