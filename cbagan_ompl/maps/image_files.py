@@ -32,8 +32,8 @@ SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".pgm", ".ppm")
 #: Largest image file: three bytes for each pixel of the largest map, and a header.
 MAX_IMAGE_BYTES = 3 * MAX_PIXELS + 2**16
 
-# Most memory that decoding may take, in bytes: four for each pixel of the largest map.
-_MAX_DECODED = 4 * MAX_PIXELS
+# Most memory that decoding may take, in bytes: three for each pixel of the largest map.
+_MAX_DECODED = 3 * MAX_PIXELS
 
 _PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -85,10 +85,9 @@ def decode_image(
     pixels, white = decode_pixels(data, name, error_class)
     if pixels.ndim == 2:
         return DecodedImage(pixels, white, None)
-    opaque = pixels[..., 3] == white if pixels.shape[2] == 4 else None
-    colours = np.ascontiguousarray(pixels[..., :3])
-    gray: Any = cv2.cvtColor(colours, cv2.COLOR_BGR2GRAY)
-    return DecodedImage(gray, white, opaque)
+    has_alpha = pixels.shape[2] == 4
+    gray: Any = cv2.cvtColor(pixels, cv2.COLOR_BGRA2GRAY if has_alpha else cv2.COLOR_BGR2GRAY)
+    return DecodedImage(gray, white, pixels[..., 3] == white if has_alpha else None)
 
 
 def decode_pixels(

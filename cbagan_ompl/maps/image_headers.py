@@ -78,7 +78,7 @@ def measure_png(data: bytes) -> Header:
     """
     width, height, _, _ = _png_header(data)
     depth, colour = data[24:26]
-    channels = 1 if colour == 0 and not _has_transparency(data) else 4
+    channels = 4 if colour in (4, 6) or _has_transparency(data) else 1 if colour == 0 else 3
     return Header(width, height, width * height * channels * (2 if depth == 16 else 1))
 
 
@@ -280,4 +280,5 @@ def measure_bmp(data: bytes) -> Header:
         raise damaged("the header makes no sense")
     if compression in (0, 3):  # rows of plain pixels, each filled up to four bytes
         length = (width * depth + 31) // 32 * 4 * height
-    return Header(width, height, width * height * 4, len(data) >= start + length)
+    channels = 4 if depth == 32 else 3
+    return Header(width, height, width * height * channels, len(data) >= start + length)

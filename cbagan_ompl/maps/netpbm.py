@@ -9,6 +9,7 @@ import re
 from collections.abc import Callable
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -65,7 +66,9 @@ def decode_netpbm(
         # Two bytes a value, high byte first, from level 256; a last odd byte is not looked at.
         body = memoryview(data)[header.end() :]
         found = min(count, len(body) // stored.itemsize)
-        levels = np.frombuffer(body, stored, count=found).astype(stored.newbyteorder("="))
+        levels = np.frombuffer(body, stored, count=found).astype(
+            stored.newbyteorder("="), copy=False
+        )
     else:
         levels = _read_numbers(data[header.end() :], count, white, name)
     if levels.size < count:
@@ -76,7 +79,8 @@ def decode_netpbm(
         raise BrokenImageError(f"the {name} holds levels outside 0 to {white}")
     if channels == 1:
         return levels.reshape(height, width), white
-    return np.ascontiguousarray(levels.reshape(height, width, 3)[..., ::-1]), white
+    colours: Any = cv2.cvtColor(levels.reshape(height, width, 3), cv2.COLOR_RGB2BGR)
+    return colours, white
 
 
 def _read_numbers(text: bytes, count: int, white: int, name: str) -> NDArray[np.uint8 | np.uint16]:
