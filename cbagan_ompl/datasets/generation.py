@@ -7,6 +7,7 @@ the same whatever the number of processes and of interruptions, with one version
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -27,7 +28,7 @@ from .dataset import Tasks
 from .geodesic_labels import geodesic_label
 from .splits import select_test_tasks
 from .synthetic import HARD_DETOUR
-from .writing import Row, task_row, write_lists, write_map, write_tasks
+from .writing import check_new_folder, task_row, write_lists, write_map, write_tasks
 
 #: File in the folder of a generated set that records its settings.
 RECORD = "dataset.json"
@@ -41,6 +42,9 @@ ITERATIONS = 5000
 #: Longest edge of RRT as a fraction of the map's size, one pixel at 64. Of the lengths tried (1/128
 #: to 12/64) the short ones give labels like the published ones; half of it is twice as slow.
 RANGE = 1 / 64
+
+# Largest record in bytes.
+_MAX_RECORD = 2**20
 
 # Attempts to find a task on a map, and those of them that look for a hard one.
 _MAX_ATTEMPTS, _MAX_HARD_ATTEMPTS = 1000, 100
@@ -141,7 +145,8 @@ def generate(
         progress: show a progress bar.
 
     Raises:
-        ConfigError: ``resume`` with other settings, or without it although the folder holds a set.
+        ConfigError: ``resume`` with other settings, or without it although the folder holds a
+            set; or files that are no part of such a set are in its place.
         MissingDependencyError: geodesic distances are needed, and numba is not installed.
         DatasetError: a file cannot be written, or a map has no task of the wanted distance.
     """
@@ -150,7 +155,7 @@ def generate(
     _prepare_folder(folder, settings, resume)
     missing = [k for k in range(settings.maps) if not _task_list(folder, k).is_file()]
     run_all(_write_map_and_tasks, [(folder, settings, k) for k in missing], jobs, "maps", progress)
-    rows: list[Row] = [task_row(k, n) for k in range(settings.maps) for n in range(settings.tasks)]
+    rows = [task_row(k, n) for k in range(settings.maps) for n in range(settings.tasks)]
     write_lists(folder, rows, settings.select_test_tasks())
 
 
@@ -163,7 +168,7 @@ def _prepare_folder(folder: Path, settings: GenerationSettings, resume: bool) ->
 
     record = folder / RECORD
     made_by = json.loads(json.dumps({"settings": asdict(settings), "ompl": ompl_version()}))
-    if record.exists():
+    if os.path.lexists(record):
         if not resume:
             raise ConfigError(
                 f"{folder} holds a set already; go on with it (--resume), or choose another folder"
@@ -173,14 +178,16 @@ def _prepare_folder(folder: Path, settings: GenerationSettings, resume: bool) ->
                 f"{record} was written with other options or another OMPL; go on with the same"
             )
         return
+    check_new_folder(folder)
     make_folder(folder, DatasetError)
     write_json(record, made_by)
 
 
 def _read_record(path: Path) -> Any:
+    text = read_text(path, DatasetError, _MAX_RECORD)
     try:
-        return json.loads(read_text(path, DatasetError))
-    except ValueError as error:
+        return json.loads(text)
+    except Exception as error:  # ValueError, and RecursionError where it is nested deeply
         raise DatasetError(f"{path}: cannot read how the set was made ({error})") from error
 
 

@@ -24,7 +24,7 @@ from .image_headers import (
     truncated,
 )
 from .netpbm import MAGIC, decode_netpbm
-from .raw_map import MAX_PIXELS, check_map_size
+from .raw_map import MAX_PIXELS, MAX_SIDE, check_map_size
 
 #: Suffixes of the files that :func:`decode_image` reads, in lower case.
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".pgm", ".ppm")
@@ -95,6 +95,7 @@ def decode_pixels(
     name: str,
     error_class: type[CbaganOmplError] = MapError,
     size: tuple[int, int] | None = None,
+    longest: int = MAX_SIDE,
 ) -> Pixels:
     """Decode an image file, told by its first bytes: the one way in for every image.
 
@@ -106,6 +107,7 @@ def decode_pixels(
         name: what to call it in messages.
         error_class: what to raise.
         size: (width, height) that the image must have; None for any.
+        longest: side in pixels that is allowed.
 
     Raises:
         CbaganOmplError: of that class; the file is empty, truncated, damaged, in none of the
@@ -115,7 +117,7 @@ def decode_pixels(
     """
 
     def check_size(width: int, height: int, needed: int) -> None:
-        check_map_size(width, height, name, error_class)
+        check_map_size(width, height, name, error_class, longest)
         if size is not None and (width, height) != size:
             raise error_class(
                 f"{name}: {width} x {height} pixels, but {size[0]} x {size[1]} are expected"

@@ -40,23 +40,28 @@ class RawMap:
 
 
 def check_map_size(
-    width: int, height: int, name: str, error_class: type[CbaganOmplError] = MapError
+    width: int,
+    height: int,
+    name: str,
+    error_class: type[CbaganOmplError] = MapError,
+    longest: int = MAX_SIDE,
 ) -> None:
-    """Raise if a map is too large to plan on.
+    """Raise if a map, or another image, is too large to work with.
 
     Args:
         width: columns, in pixels.
         height: rows, in pixels.
         name: what to call the map in the message.
         error_class: what to raise.
+        longest: side in pixels that is allowed.
 
     Raises:
-        CbaganOmplError: of that class; more than :data:`MAX_SIDE` pixels a side or
+        CbaganOmplError: of that class; it has more pixels a side, or more than
             :data:`MAX_PIXELS` in all.
     """
-    if max(width, height) > MAX_SIDE or width * height > MAX_PIXELS:
+    if max(width, height) > longest or width * height > MAX_PIXELS:
         raise error_class(
-            f"{name}: {width} x {height} pixels; maps up to {MAX_SIDE} pixels a side and "
+            f"{name}: {width} x {height} pixels; maps up to {longest} pixels a side and "
             f"{MAX_PIXELS} pixels in all are supported, scale it down first"
         )
 
