@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.files import read_bytes
-from ..errors import DatasetError, show
+from ..errors import CbaganOmplError, DatasetError, show
 from ..maps.image_files import MAX_IMAGE_BYTES, decode_pixels
 from .tables import read_table
 
@@ -183,7 +183,7 @@ def label_files(folder: str | PathLike[str], part: str) -> list[Path]:
 
 def _map_number(name: str) -> tuple[int, str]:
     """Return K of ``map_K.png``, or -1, and the name itself as a key to sort by."""
-    match = re.fullmatch(r"map_(\d+)", Path(name).stem)
+    match = re.fullmatch(r"map_(\d{1,18})(\.[^.]*)?", name)
     return int(match[1]) if match else -1, name
 
 
@@ -193,7 +193,7 @@ def _read_rows(path: Path) -> list[Row]:
         raise DatasetError(f"{path}: the list is empty")
     for row in rows:
         for name in row:
-            if Path(name).name != name or Path(name).stem in (".", ".."):
+            if "/" in name or name == "." or name.startswith(".."):
                 raise DatasetError(f"{path}: {show(name)} is no name of a file without folders")
     return rows
 
@@ -251,19 +251,22 @@ def read_image(path: Path, size: int | None = None) -> NDArray[np.uint8]:
     return np.asarray(pixels[..., 2::-1], dtype=np.uint8)
 
 
-def check_pixels(count: int, size: int, name: str) -> None:
+def check_pixels(
+    count: int, size: int, name: str, error_class: type[CbaganOmplError] = DatasetError
+) -> None:
     """Raise if images do not fit into memory together.
 
     Args:
         count: number of the images.
         size: width and height of each in pixels.
         name: what to call them in the message.
+        error_class: what to raise.
 
     Raises:
-        DatasetError: they have more than :data:`MAX_PIXELS` pixels.
+        CbaganOmplError: of that class; they have more than :data:`MAX_PIXELS` pixels.
     """
     if count * size * size > MAX_PIXELS:
-        raise DatasetError(
+        raise error_class(
             f"{name}: {count} images of {size} x {size} pixels; a set holds up to "
             f"{MAX_PIXELS} pixels, which are kept in memory"
         )

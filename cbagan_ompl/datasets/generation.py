@@ -17,17 +17,24 @@ from numpy.typing import NDArray
 
 from ..common.files import make_folder, read_text, write_json
 from ..common.parallel import run_all
-from ..common.validation import check_at_least, check_fraction, require
-from ..errors import ConfigError, DatasetError
+from ..common.validation import (
+    check_fraction,
+    finite_number,
+    positive_number,
+    require,
+    whole_number,
+)
+from ..errors import ConfigError, DatasetError, show
 from ..map_generators import MAP_GENERATORS, MIN_SIZE, check_generators
 from ..map_generators.randomization import randomized_map
 from ..maps.grid_map import GridMap
 from ..sampling.heatmap import REGION_THRESHOLD, pixel_pair
 from .augmentation import augment
-from .dataset import Tasks
+from .dataset import MAX_SIZE, Tasks, check_pixels
 from .geodesic_labels import geodesic_label
 from .splits import select_test_tasks
 from .synthetic import HARD_DETOUR
+from .tables import MAX_LINES
 from .writing import check_new_folder, task_row, write_lists, write_map, write_tasks
 
 #: File in the folder of a generated set that records its settings.
@@ -100,19 +107,24 @@ class GenerationSettings:
 
     def __post_init__(self) -> None:
         for name in ("maps", "tasks", "copies", "runs"):
-            check_at_least(name, getattr(self, name), 1)
-        check_at_least("size", self.size, MIN_SIZE)
+            whole_number(name, getattr(self, name), 1, MAX_LINES)
+        whole_number("size", self.size, MIN_SIZE, MAX_SIZE)
         check_generators(self.generators)
         if self.label not in LABELS:
-            raise ConfigError(f"a label is one of {', '.join(LABELS)}, got {self.label!r}")
-        check_fraction("hard_fraction", self.hard_fraction)
-        if self.range is not None and not 0 < self.range < float("inf"):
-            raise ConfigError(f"range must be above 0, got {self.range}")
-        if not 0 <= self.min_distance < 1:
+            raise ConfigError(f"a label is one of {', '.join(LABELS)}, got {show(self.label)}")
+        check_fraction("hard_fraction", finite_number("hard_fraction", self.hard_fraction, 0))
+        if self.range is not None:
+            positive_number("range", self.range)
+        if not finite_number("min_distance", self.min_distance, 0) < 1:
             raise ConfigError(
                 f"min_distance is a fraction of the map's size, from 0 to below 1, "
-                f"got {self.min_distance}"
+                f"got {show(self.min_distance)}"
             )
+        if self.maps * self.tasks > MAX_LINES:
+            raise ConfigError(
+                f"a set holds up to {MAX_LINES} tasks, {self.maps * self.tasks} are asked for"
+            )
+        check_pixels(self.maps * self.tasks, self.size, "the set", ConfigError)
         # Raises for an impossible seed or split before any work is done.
         self.select_test_tasks()
 

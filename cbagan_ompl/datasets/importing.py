@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.files import reason
-from ..common.validation import check_at_least
+from ..common.validation import whole_number
 from ..errors import ConfigError, DatasetError
 from ..maps.connectivity import connects
 from .archives import unpack
@@ -130,7 +130,7 @@ def write_dataset(
         DatasetError: a file cannot be written.
     """
     check_new_folder(folder)
-    check_at_least("copies", copies, 1)
+    whole_number("copies", copies, 1)
     tasks, was_test = _concatenate_parts(dataset)
     order = np.argsort(tasks.map_of, kind="stable")
     tasks, was_test = tasks.select(order), was_test[order]

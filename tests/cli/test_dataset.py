@@ -33,8 +33,8 @@ def test_generate_import_and_noise_commands(
     assert json.loads(report.read_text())["tasks"] == 1
     for more, message in (
         (("--tasks", "7"), "from 1 to 1, got 7"),
-        (("--tasks", "1", "--seed", "-1"), "seed must be at least 0, got -1"),
-        (("--runs", "0"), "runs and range must be positive, got 0"),
+        (("--tasks", "1", "--seed", "-1"), "seed is a whole number of at least 0, got -1"),
+        (("--runs", "0"), "runs is a whole number of at least 1, got 0"),
         (("--json", str(tmp_path / "none" / "x.json")), "its folder does not exist"),
     ):
         assert main([*words, *more]) == 2
@@ -58,7 +58,7 @@ def test_a_split_needs_a_copy(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert main(words) == 2
     assert "give --output as well" in capsys.readouterr().err
     assert main([*words, "--output", str(tmp_path / "copy"), "--seed", "-1"]) == 2
-    assert "seed must be at least 0, got -1" in capsys.readouterr().err
+    assert "seed is a whole number of at least 0, got -1" in capsys.readouterr().err
     assert not (tmp_path / "copy").exists()
 
 
