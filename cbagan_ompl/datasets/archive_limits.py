@@ -8,7 +8,7 @@ from typing import NamedTuple
 from ..errors import show
 
 #: Most files and folders in an archive, and bytes in all of them together.
-MAX_MEMBERS, MAX_TOTAL = 2**18, 2**31
+MAX_MEMBERS, MAX_TOTAL = 2**17, 2**31
 
 #: An archive may grow to so many times its size, beyond so many bytes that are not counted.
 MAX_RATIO, FREE_BYTES = 200, 2**24

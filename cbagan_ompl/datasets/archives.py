@@ -14,13 +14,17 @@ from typing import BinaryIO
 
 from ..common.files import open_regular, reason
 from ..errors import DatasetError, show
+from ..maps.image_files import SUFFIXES
 from .archive_limits import MAX_MEMBERS, ArchiveError, Member, check_name
 from .tar_members import read_tar
 from .zip_members import MAGIC, read_zip
 
+# Of the files of a set; others are not written.
+_SUFFIXES = (".csv", *SUFFIXES)
+
 
 def unpack(path: Path, folder: Path) -> None:
-    """Unpack an archive: .tar, as it is or packed by gzip, bzip2 or xz, or .zip.
+    """Unpack the lists and images of an archive: .tar, perhaps in gzip, bzip2 or xz, or .zip.
 
     Args:
         path: of the archive.
@@ -56,18 +60,19 @@ def _write_members(members: Iterator[Member], folder: Path) -> None:
         if count > MAX_MEMBERS:
             raise ArchiveError(f"it has more than {MAX_MEMBERS} members")
         parts = check_name(member.name)
-        for depth in range(len(parts)):
-            _add_folder(parts[:depth], folder, seen)
         if member.is_folder:
-            _add_folder(parts, folder, seen)
-        elif parts in seen:
-            raise ArchiveError(f"the name {show(member.name)} is there twice")
-        else:
-            seen[parts] = False
-            # Every folder on the way is one that was made here, so nothing leads outside.
-            with folder.joinpath(*parts).open("xb") as target:
-                for block in member.blocks:
-                    target.write(block)
+            continue  # made when something is to lie in it
+        if parts in seen:
+            raise ArchiveError(f"the name {show(member.name)} is there twice, or none")
+        seen[parts] = False
+        if not parts[-1].lower().endswith(_SUFFIXES):
+            continue
+        for depth in range(1, len(parts)):
+            _add_folder(parts[:depth], folder, seen)
+        # Every folder on the way is one that was made here, so nothing leads outside.
+        with folder.joinpath(*parts).open("xb") as target:
+            for block in member.blocks:
+                target.write(block)
 
 
 def _add_folder(parts: tuple[str, ...], folder: Path, seen: dict[tuple[str, ...], bool]) -> None:

@@ -18,6 +18,8 @@ _FILES, _FOLDER = (b"0", b"\0"), b"5"
 _LONG_NAME, _LONG_LINK, _PAX, _PAX_GLOBAL = b"L", b"K", b"x", b"g"
 _OTHERS = {b"1": "a hard link", b"2": "a symbolic link", b"S": "a sparse file"}
 
+_TRUNCATED = "it is truncated, get a complete copy"
+
 # Longest record of that kind, and most of them in a row.
 _MAX_EXTENSION, _MAX_EXTENSIONS = 2**20, 8
 
@@ -150,7 +152,7 @@ class _Stream:
             if not block:
                 if may_end and missing == size:
                     return
-                raise ArchiveError("it is truncated, get a complete copy")
+                raise ArchiveError(_TRUNCATED)
             missing -= len(block)
             self._unpacked += len(block)
             check_growth(self._unpacked, self._packed)
@@ -182,7 +184,7 @@ class _Stream:
             else:
                 packed = self._read_packed(BLOCK) if self._unpacker.needs_input else b""
                 if not packed and self._unpacker.needs_input:
-                    return b""
+                    raise ArchiveError(_TRUNCATED)
                 block = self._unpacker.decompress(packed, most)
             if block:
                 return bytes(block)
