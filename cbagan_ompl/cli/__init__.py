@@ -14,11 +14,6 @@ from ..common.files import reason
 from ..common.outputs import check_output
 from ..common.signals import Terminated
 from ..errors import CbaganOmplError
-from .benchmark import add_benchmark_parser
-from .dataset import add_dataset_parser
-from .evaluate import add_evaluate_parser
-from .plan import add_plan_parser
-from .train import add_export_parser, add_train_parser
 
 #: Exit statuses beside 0 and 1: bad input, and what is our own fault (EX_SOFTWARE of sysexits.h).
 BAD_INPUT, INTERNAL_ERROR = 2, 70
@@ -58,6 +53,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         status, text = _explain(error)
         print(f"cbagan-ompl {args.command}: {text}", file=sys.stderr)
         return status
+
+
+def load_commands() -> None:
+    """Import what the commands need, which takes a second: not done with this module.
+
+    So the command line can handle Ctrl-C and SIGTERM before.
+    """
+    from . import benchmark, dataset, evaluate, plan, train  # noqa: F401
 
 
 def _explain(error: Exception) -> tuple[int, str]:
@@ -102,6 +105,12 @@ def _bind_points(arguments: Sequence[str]) -> list[str]:
 
 
 def _make_parser() -> argparse.ArgumentParser:
+    from .benchmark import add_benchmark_parser
+    from .dataset import add_dataset_parser
+    from .evaluate import add_evaluate_parser
+    from .plan import add_plan_parser
+    from .train import add_export_parser, add_train_parser
+
     parser = argparse.ArgumentParser(
         prog="cbagan-ompl", description="A learned state sampler for OMPL's planners."
     )

@@ -6,16 +6,20 @@ import os
 import sys
 from types import FrameType
 
-from ..common.signals import handle_endings, raise_once
+from ..common.signals import Terminated, handle_endings, raise_once
+from . import INTERRUPTED, TERMINATED, load_commands, main
 
 
 def run() -> None:
     """Run the command line as a process of its own, which Ctrl-C and SIGTERM may end any time."""
     handle_endings(_end_at_once)
-    from . import main  # loads what the commands need: nothing is open yet, nothing to clean up
-
+    load_commands()  # nothing is open yet, nothing to clean up
     handle_endings(raise_once)
-    status = main()
+    try:
+        status = main()
+    except KeyboardInterrupt as error:  # while the command line was parsed
+        status = TERMINATED if isinstance(error, Terminated) else INTERRUPTED
+    handle_endings(_end_at_once)
     try:
         sys.stdout.flush()
     except OSError as error:  # a full disk behind "> file"
