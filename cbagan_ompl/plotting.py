@@ -188,8 +188,8 @@ def _label_axes(axes: Axes, grid: GridMap) -> None:
         low, high = sorted(limits.tolist())
         values = MaxNLocator(_MOST_TICKS).tick_values(low, high)
         values = values[(values >= low) & (values <= high)]
-        places = grid.to_pixel(np.stack((values, values), axis=-1))[:, number]
-        axis.set_major_locator(FixedLocator(places.tolist()))
+        ticks = grid.to_pixel(np.stack((values, values), axis=-1))[:, number]
+        axis.set_major_locator(FixedLocator(ticks.tolist()))
         axis.set_major_formatter(FixedFormatter([f"{value:g}" for value in values]))
     axes.tick_params(labelsize=8)
     axes.set_xlabel(f"x, {unit}", fontsize=8, labelpad=1)
@@ -204,9 +204,9 @@ def _draw_scale_bar(axes: Axes, grid: GridMap) -> None:
     length = float(10 ** np.floor(np.log10(most)))
     length *= max(factor for factor in (1, 2, 5) if factor * length <= most)
     below = bottom + 0.03 * (bottom - top)
-    ends = (left, left + length / grid.resolution)
-    axes.plot(ends, (below, below), color=BLACK, linewidth=2.5, clip_on=False)
-    axes.text(ends[1] + 0.01 * (right - left), below, f"{length:g} m", fontsize=8, va="center")
+    bar = (left, left + length / grid.resolution)
+    axes.plot(bar, (below, below), color=BLACK, linewidth=2.5, clip_on=False)
+    axes.text(bar[1] + 0.01 * (right - left), below, f"{length:g} m", fontsize=8, va="center")
 
 
 def _headline(result: PlanResult) -> str:

@@ -42,7 +42,7 @@ BEST_KNOWN = "best_known_cost REAL"
 TIME = "time REAL"
 #: OMPL's own property of a run: states in the tree or roadmap.
 NODES = "graph states INTEGER"
-#: OMPL's own property of points of progress; BIT* and its kin call it a DOUBLE.
+#: OMPL's own property of points of progress; BIT* and its relatives call it a DOUBLE.
 BEST_COST = "best cost"
 
 #: Thresholds of good paths, percent above the best known cost, for which every log has a time.

@@ -121,7 +121,7 @@ def _add_task(log: ExperimentLog, job: Job) -> ExperimentLog:
         parameters={
             **log.parameters,
             MAP: job.task.grid.name,
-            # A map of no kind is a kind of its own.
+            # A map without a kind forms a group by itself.
             FAMILY: job.task.task.family or job.task.grid.name,
             "task INTEGER": str(job.task.number),
             "start_x REAL": f"{start_x:.9g}",

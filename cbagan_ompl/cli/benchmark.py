@@ -14,7 +14,13 @@ from ..common.validation import check_at_least
 from ..errors import ConfigError
 from ..maps.loading import bundled_maps
 from ..planning.heatmap_sources import LEARNED
-from .options import add_map_options, add_sampler_options, map_options, sampler_options
+from .options import (
+    add_map_options,
+    add_sampler_options,
+    describe_samplers,
+    map_options,
+    sampler_options,
+)
 
 _HELP = """\
 Compare samplers in OMPL's own planners, with OMPL's Benchmark, on the same tasks.
@@ -30,7 +36,9 @@ At the end the output folder holds:
   summary.md        the same as a report
   *.png, *.pdf      plots
 
-Exit status: 0 done, 1 some tasks failed, 2 bad input, 130 interrupted (continue with --resume).
+Exit status: 0 done, 1 some tasks failed, 2 bad input or a file that cannot be written, 70 an error
+of cbagan-ompl itself (--debug prints its traceback), 130 interrupted, 143 terminated (continue
+with --resume).
 """
 
 
@@ -52,7 +60,8 @@ def add_benchmark_parser(commands: Any) -> None:
         "--tasks",
         metavar="FILE",
         help="tasks for the maps: .csv (map,start_x,start_y,goal_x,goal_y[,optimal_cost,"
-        "family]) or MovingAI .scen (default: those that come with a map, otherwise random ones)",
+        "family], where family is the kind of map) or MovingAI .scen (default: those that come "
+        "with a map, otherwise random ones)",
     )
     tasks.add_argument(
         "--tasks-per-map",
@@ -78,8 +87,7 @@ def add_benchmark_parser(commands: Any) -> None:
         type=_names,
         default=defaults.samplers,
         metavar="A,B",
-        help="uniform (OMPL's own), learned, corridor (around a grid search's path), straight-line "
-        f"(default: {','.join(defaults.samplers)})",
+        help=f"{describe_samplers()} (default: {','.join(defaults.samplers)})",
     )
     comparison.add_argument(
         "--heatmap-dir",

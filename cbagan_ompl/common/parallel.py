@@ -68,10 +68,10 @@ def run_all(
     with ProcessPoolExecutor(processes, context) as pool:
         try:
             with interrupts_held():  # submitting starts the processes
-                places = {pool.submit(work, *args): i for i, args in enumerate(arguments)}
-            done = as_completed(places)
-            for future in tqdm(done, total=len(places), unit=f" {unit}", disable=not progress):
-                results[places[future]] = future.result()
+                positions = {pool.submit(work, *args): i for i, args in enumerate(arguments)}
+            done = as_completed(positions)
+            for future in tqdm(done, total=len(positions), unit=f" {unit}", disable=not progress):
+                results[positions[future]] = future.result()
         except BrokenProcessPool as error:
             raise DatasetError(
                 f"a process that worked on the {unit} has died, perhaps for lack of memory"

@@ -97,7 +97,7 @@ def decode_pixels(
     size: tuple[int, int] | None = None,
     longest: int = MAX_SIDE,
 ) -> Pixels:
-    """Decode an image file, told by its first bytes: the one way in for every image.
+    """Decode an image file, recognised by its first bytes: the one way in for every image.
 
     Pixels are taken as stored: a rotation that the EXIF data ask for is not applied, nor are the
     profiles of a PNG. What follows the end of an image is not looked at.

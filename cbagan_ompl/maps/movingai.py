@@ -72,7 +72,7 @@ def _count(path: Path, lines: list[str], key: str) -> int:
     for number, line in enumerate(lines[:4], start=1):
         words = line.split()
         if words[:1] == [key]:
-            # Nothing longer than nine digits, lest int() work on it for long.
+            # At most nine digits: int() takes long for very many.
             if len(words) == 2 and words[1].isdecimal() and len(words[1]) < 10 and int(words[1]):
                 return int(words[1])
             raise MapError(
@@ -117,21 +117,21 @@ def read_scenarios(path: Path) -> list[Scenario]:
     return scenarios
 
 
-def _scenario(place: str, line: str) -> Scenario:
+def _scenario(location: str, line: str) -> Scenario:
     fields = line.split("\t") if "\t" in line else line.split()
     if len(fields) != 9:
         raise MapError(
-            f"{place}: expected 9 fields (bucket, map, width, height, start x, start y, goal x, "
+            f"{location}: expected 9 fields (bucket, map, width, height, start x, start y, goal x, "
             f"goal y, optimal length), found {len(fields)}"
         )
     try:
         width, height, start_x, start_y, goal_x, goal_y = (int(field) for field in fields[2:8])
         float(fields[8])
     except ValueError as error:
-        raise MapError(f"{place}: not a number: {error}") from error
+        raise MapError(f"{location}: not a number: {error}") from error
     if width < 1 or height < 1:
-        raise MapError(f"{place}: the map size {width} x {height} must be positive")
+        raise MapError(f"{location}: the map size {width} x {height} must be positive")
     for role, x, y in (("start", start_x, start_y), ("goal", goal_x, goal_y)):
         if not (0 <= x < width and 0 <= y < height):
-            raise MapError(f"{place}: {role} ({x}, {y}) is outside a map of {width} x {height}")
+            raise MapError(f"{location}: {role} ({x}, {y}) is outside a map of {width} x {height}")
     return Scenario(width, height, (start_x, start_y), (goal_x, goal_y))

@@ -1,7 +1,7 @@
-"""The one place that knows how OMPL's Python bindings differ between versions.
+"""The one module that knows how OMPL's Python bindings differ between versions.
 
-Two generations of wheels are served: 1.7 (Boost.Python) and 2.0 (nanobind). Features are told by
-what the bindings offer, not by version number, so that a build that binds more is used better.
+Two generations of wheels are served: 1.7 (Boost.Python) and 2.0 (nanobind). Features are recognised
+by what the bindings offer, not by version number, so that a build that binds more is used better.
 """
 
 from __future__ import annotations
@@ -212,9 +212,9 @@ def tree_edges(data: Any) -> NDArray[np.float64]:
 def _edges_from(data: Any, vertex: int) -> list[int]:
     if not BOOST_PYTHON:
         return list(data.getEdges(vertex))
-    ends = ou.vectorUint()
-    data.getEdges(vertex, ends)
-    return list(ends)
+    targets = ou.vectorUint()
+    data.getEdges(vertex, targets)
+    return list(targets)
 
 
 def planner_class(name: str) -> Any:

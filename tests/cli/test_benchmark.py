@@ -24,6 +24,7 @@ UNREACHED = "EITstar" if BOOST_PYTHON else "BITstar"
 SUITES = Path(__file__).resolve().parents[2] / "benchmarks" / "suites"
 
 
+@pytest.mark.slow
 def test_resume_runs_only_what_is_missing(
     finished: Finished, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -42,6 +43,7 @@ def test_resume_runs_only_what_is_missing(
     assert "other options" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("interruptible")
 def test_interrupt_keeps_finished_tasks(map_folder: Path, tmp_path: Path) -> None:
     folder = tmp_path / "out"
@@ -58,6 +60,7 @@ def test_interrupt_keeps_finished_tasks(map_folder: Path, tmp_path: Path) -> Non
         assert parse_log(log.read_text()).runs == 2
 
 
+@pytest.mark.slow
 def test_several_models_side_by_side(tmp_path: Path) -> None:
     pytest.importorskip("torch")
     from cbagan_ompl.inference.model_files import bundled_model
