@@ -14,7 +14,8 @@ from ..common.validation import require_torch
 from ..errors import ModelError
 from ..maps.grid_map import GridMap
 from ..sampling.heatmap import Heatmap
-from .model_files import bundled_model, load_script, read_record
+from .model_files import bundled_model, load_script, read_model
+from .probe import Kind, try_model
 
 if TYPE_CHECKING:
     import torch
@@ -31,7 +32,10 @@ _MAX_ENLARGEMENT = 2
 def load_model(path: str | PathLike[str] | None = None) -> Predictor:
     """Load an exported model, ready to predict.
 
-    TorchScript files can carry code, so load only files from a source that you trust.
+    TorchScript files can carry code, so load only files from a source that you trust. Damage is
+    found before it does harm: archive, record and the length of each tensor are checked before
+    torch opens the file, and a model that no ``manifest.json`` beside it lists (``export`` writes
+    one) is tried in another process first, which takes a second, once for each content.
 
     Args:
         path: a file that ``cbagan-ompl export`` wrote; the bundled model by default.
@@ -46,10 +50,14 @@ def load_model(path: str | PathLike[str] | None = None) -> Predictor:
     """
     require_torch()
     source = bundled_model() if path is None else Path(path)
-    record = read_record(source)
+    model = read_model(source)
+    if not model.is_listed:
+        try_model(str(source), model.script, Kind.REGION, model.record["working_size"])
     try:
-        predictor = Predictor(load_script(source), record)
+        predictor = Predictor(load_script(model.script), model.record)
         predictor.warm_up()
+    except ModelError as error:
+        raise ModelError(f"{source}: {error}; copy or export it again") from error
     except Exception as error:  # torch raises many types for damaged archives
         raise ModelError(
             f"{source}: torch cannot load the model ({type(error).__name__}), the file is "
@@ -84,10 +92,17 @@ class Predictor:
         self.inference_threads = 1
 
     def warm_up(self) -> None:
-        """Predict for an empty map, since the first call takes up to four times as long."""
+        """Predict for an empty map, since the first call takes up to four times as long.
+
+        Raises:
+            ModelError: the output is no image of probabilities.
+        """
         size = int(self.record["working_size"])
         endpoints = np.array([[0.5, 0.5], [size - 0.5, size - 0.5]])
-        self.probabilities(np.ones((1, size, size), np.bool_), endpoints[:1], endpoints[1:])
+        free = np.ones((1, size, size), np.bool_)
+        values = self.probabilities(free, endpoints[:1], endpoints[1:])
+        if values.shape != free.shape or not ((values >= 0) & (values <= 1)).all():
+            raise ModelError("the model gives no image of probabilities, it is probably damaged")
 
     def predict(
         self, grid: GridMap, start: ArrayLike, goal: ArrayLike, repair: bool = True

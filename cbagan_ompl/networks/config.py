@@ -29,6 +29,13 @@ NETWORKS: dict[str, dict[str, Any]] = {
     },
 }
 
+#: Height and width of the largest images that networks are trained on and applied to, in pixels.
+MAX_IMAGE_SIZE = 1024
+
+#: Most weights of the generator and the discriminators of a run together; the paper's have two
+#: million. A checkpoint has up to six numbers for each.
+MAX_WEIGHTS = 2**23
+
 # The queries of self-attention have an eighth of the channels of its input.
 _MIN_SELF_ATTENTION_WIDTH = 8
 
