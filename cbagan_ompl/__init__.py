@@ -23,6 +23,7 @@ from .errors import (
     PlannerError,
     TaskError,
 )
+from .planning.exit_protection import protect_exit
 
 if TYPE_CHECKING:
     from .inference.predictor import Predictor, load_model
@@ -100,6 +101,8 @@ _HOMES = {
     "sampling.heatmap": ("Heatmap",),
     "sampling.options": ("Adaptation", "SamplerOptions"),
 }
+protect_exit()
+
 _LAZY = {name: module for module, names in _HOMES.items() for name in names}
 
 

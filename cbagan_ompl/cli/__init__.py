@@ -10,7 +10,8 @@ import traceback
 from collections.abc import Sequence
 
 from .. import __version__
-from ..common.files import check_folder, reason
+from ..common.files import reason
+from ..common.outputs import check_output
 from ..common.signals import Terminated
 from ..errors import CbaganOmplError
 from .benchmark import add_benchmark_parser
@@ -40,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = _make_parser()
     args = parser.parse_args(_bind_points(sys.argv[1:] if arguments is None else arguments))
     try:
-        check_folder(getattr(args, "json", None))
+        check_output(getattr(args, "json", None), _inputs(args), force=_forces(args))
         return int(args.run(args))
     except BrokenPipeError:
         # The reader of our output has gone, as in "| head -1": files are written by then.
@@ -73,6 +74,18 @@ def _explain(error: Exception) -> tuple[int, str]:
     )
 
 
+# Names under which commands keep the files that they read.
+_INPUT_ARGUMENTS = (
+    "map",
+    "heatmap",
+    "model",
+    "checkpoint",
+    "dataset",
+    "path",
+    "config",
+    "inception",
+)
+
 # What a full or protected disk, and not a mistake of ours, is the cause of.
 _OF_THE_SYSTEM = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO}
 
@@ -100,12 +113,28 @@ def _make_parser() -> argparse.ArgumentParser:
     add_train_parser(commands)
     add_export_parser(commands)
     add_evaluate_parser(commands)
-    _add_debug_option(parser, default=False)
+    _add_common_options(parser, default=False)
     return parser
 
 
-def _add_debug_option(parser: argparse.ArgumentParser, default: object) -> None:
-    """Add ``--debug`` to a parser and to those of its commands."""
+def _inputs(args: argparse.Namespace) -> list[str]:
+    """Return the files that a command reads."""
+    given = (getattr(args, name, None) for name in _INPUT_ARGUMENTS)
+    return [path for path in given if isinstance(path, str)]
+
+
+def _forces(args: argparse.Namespace) -> bool:
+    return bool(getattr(args, "force", False))
+
+
+def _add_common_options(parser: argparse.ArgumentParser, default: object) -> None:
+    """Add ``--debug`` to a parser and its commands, and ``--force`` where they write files."""
+    if any(action.dest == "json" for action in parser._actions):
+        parser.add_argument(
+            "--force",
+            action="store_true",
+            help="replace files that are not known to be written by cbagan-ompl",
+        )
     parser.add_argument(
         "--debug",
         action="store_true",
@@ -115,4 +144,4 @@ def _add_debug_option(parser: argparse.ArgumentParser, default: object) -> None:
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             for command in action.choices.values():
-                _add_debug_option(command, argparse.SUPPRESS)
+                _add_common_options(command, argparse.SUPPRESS)

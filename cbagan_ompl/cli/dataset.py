@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ..common.files import write_json
+from ..common.outputs import write_report
 from ..common.validation import check_at_least
 from ..datasets.generation import LABELS, RANGE, RUNS, GenerationSettings, generate
 from ..datasets.importing import KEEP, describe, import_dataset, write_dataset
@@ -195,7 +195,7 @@ def _import(args: argparse.Namespace) -> int:
     if args.output is not None:
         print(f"copied to {args.output}, split: {args.split}")
     if args.json is not None:
-        write_json(args.json, values)
+        write_report(args.json, values)
     return 0
 
 
@@ -220,7 +220,7 @@ def _generate(args: argparse.Namespace) -> int:
     generate(Path(args.output), settings, args.jobs, args.resume)
     print(f"{settings.maps * settings.tasks} tasks written to {args.output}")
     if args.json is not None:
-        write_json(args.json, describe(import_dataset(Path(args.output))))
+        write_report(args.json, describe(import_dataset(Path(args.output))))
     return 0
 
 
@@ -238,5 +238,5 @@ def _noise(args: argparse.Namespace) -> int:
         if isinstance(scores, dict):
             print(f"  {name:28} IoU {scores['iou']:.3f}  Dice {scores['dice']:.3f}")
     if args.json is not None:
-        write_json(args.json, values)
+        write_report(args.json, values)
     return 0

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..common.files import make_folder, write_atomically, write_json
+from ..common.outputs import write_report
 from ..common.validation import check_at_least
 from ..errors import ConfigError
 
@@ -121,7 +122,7 @@ def _evaluate(args: argparse.Namespace) -> int:
         "predictions": {evaluation.name: evaluation.to_dict() for evaluation in evaluations},
     }
     if args.json is not None:
-        write_json(args.json, result)
+        write_report(args.json, result)
     if args.output is not None:
         _save(Path(args.output), result, table, evaluations[: len(names)], tasks)
     return 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ..common.files import check_folder, write_json
+from ..common.outputs import check_output, write_report
 from ..errors import ConfigError
 from ..maps.grid_map import GridMap
 from ..maps.loading import bundled_maps
@@ -103,7 +103,7 @@ def _plan(args: argparse.Namespace) -> int:
         from ..common.figures import check_figure_path
 
         check_figure_path(args.output)
-    check_folder(args.output)
+    check_output(args.output, [args.map, args.heatmap or ""], force=args.force)
     grid = GridMap.load(args.map, **map_options(args))
     start, goal = _endpoints(args, grid)
     result = plan(
@@ -124,7 +124,7 @@ def _plan(args: argparse.Namespace) -> int:
     )
     values = result.to_dict()
     if args.json is not None:
-        write_json(args.json, values)
+        write_report(args.json, values)
     if args.output is not None:
         from ..plotting import save_figure
 

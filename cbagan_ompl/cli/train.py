@@ -6,7 +6,7 @@ import argparse
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
-from ..common.files import write_json
+from ..common.outputs import write_report
 from ..common.validation import check_at_least, require_torch
 from ..datasets.dataset import load_dataset
 from ..datasets.synthetic import HARD_DETOUR, TASKS_PER_MAP, SyntheticSettings
@@ -193,7 +193,7 @@ def _train(args: argparse.Namespace) -> int:
         return 0
     _print_scores(result)
     if args.json is not None:
-        write_json(args.json, result)
+        write_report(args.json, result)
     return 0
 
 
@@ -235,5 +235,5 @@ def _export(args: argparse.Namespace) -> int:
     if record["metrics"]["test"] is None:
         print("the training run has not come to its end: the card has validation scores only")
     if args.json is not None:
-        write_json(args.json, record)
+        write_report(args.json, record)
     return 0

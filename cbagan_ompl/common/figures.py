@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 
 from ..errors import ConfigError
 from .files import reason
+from .outputs import MADE_BY
 
 # Okabe and Ito's palette, which colour-blind readers can tell apart
 # (https://jfly.uni-koeln.de/color/).
@@ -78,6 +79,18 @@ def write_figure(figure: Figure, path: str | PathLike[str], dots_per_inch: int =
         ConfigError: the file cannot be written.
     """
     try:
-        figure.savefig(path, dpi=dots_per_inch)
+        figure.savefig(path, dpi=dots_per_inch, **_signature_of(path))
     except OSError as error:
         raise ConfigError(f"cannot write the figure {path}: {reason(error)}") from error
+
+
+def _signature_of(path: str | PathLike[str]) -> dict[str, Any]:
+    """Return the options of ``savefig`` that make a file say what wrote it."""
+    suffix = Path(path).suffix.lower()
+    if suffix == ".png":
+        return {"metadata": {"Software": MADE_BY}}
+    if suffix in (".pdf", ".svg", ".svgz", ".ps", ".eps"):
+        return {"metadata": {"Creator": MADE_BY}}
+    if suffix in (".jpg", ".jpeg"):
+        return {"pil_kwargs": {"comment": MADE_BY.encode()}}
+    return {}

@@ -151,7 +151,9 @@ def _choose_doors(
     # The search follows neighbours in the order of their numbers, so these are shuffled.
     number = rng.permutation(cells.size)
     weights = 1 + rng.random(len(pairs))
-    graph = csr_array((weights, number[pairs].T), shape=(cells.size, cells.size))
+    # 32 bits, because older versions of SciPy search graphs of such indices alone.
+    indices = number[pairs].T.astype(np.int32)
+    graph = csr_array((weights, indices), shape=(cells.size, cells.size))
     if winding:
         first = int(rng.integers(cells.size))
         order, predecessor = depth_first_order(graph, first, directed=False)

@@ -2,40 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
-from math import cos, isfinite, sin
 from os import PathLike
-from typing import Any, NamedTuple
+from typing import Any
+from weakref import ReferenceType, ref
 
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..common.validation import is_finite_number
-from ..errors import MapError, TaskError
+from ..common.validation import finite_number, is_finite_number
+from ..errors import MapError
 from .collision import segment_is_free
 from .connectivity import label_components
+from .endpoints import Endpoints, check_endpoints, snap_to_free
+from .frames import Affine, pixel_from_world, world_from_pixel
+from .inflation import erode
 from .loading import read_map
-from .raw_map import check_map_size
+from .occupancy import read_costmap, read_occupancy_grid
+from .raw_map import RawMap, check_cells, check_origin, check_resolution
 
-
-class Affine(NamedTuple):
-    """The affine function (x, y) -> (a x + b y + c, d x + e y + f)."""
-
-    a: float
-    b: float
-    c: float
-    d: float
-    e: float
-    f: float
-
-    def __call__(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Apply to points, shape (..., 2)."""
-        x, y = points[..., 0], points[..., 1]
-        return np.stack(
-            (self.a * x + self.b * y + self.c, self.d * x + self.e * y + self.f), axis=-1
-        )
+# Inflated maps that a map keeps, so that a plan on it again need not make them again.
+_KEPT_RADII = 4
 
 
 class GridMap:
@@ -52,7 +40,7 @@ class GridMap:
       the map in the world, lengths in metres, yaw in radians, counter-clockwise.
 
     Args:
-        free: shape (H, W), row 0 on top; true or non-zero where the robot may be.
+        free: shape (H, W), row 0 on top; true or 1 where the robot may be, false or 0 elsewhere.
         resolution: world units per pixel.
         origin: pose of the lower left corner for maps in the ROS frame.
         name: what the map is called in messages and results.
@@ -60,13 +48,13 @@ class GridMap:
             not; None where no pixel is so. It serves figures alone.
 
     Raises:
-        MapError: not a 2-D array of at least 1 x 1 pixel, too large (see
+        MapError: not a 2-D array of truth values or of 0 and 1, too large (see
             :func:`cbagan_ompl.maps.raw_map.check_map_size`), no free pixel, or a resolution or
             origin that is not finite (resolution also positive).
 
     Example:
         >>> grid = GridMap([[1, 1, 0], [1, 0, 0]], resolution=0.5)
-        >>> grid.shape, bool(grid.is_free((0.2, 0.8)))
+        >>> grid.shape, grid.is_free((0.2, 0.8))
         ((2, 3), True)
     """
 
@@ -79,41 +67,15 @@ class GridMap:
         name: str = "map",
         unknown: NDArray[np.bool_] | None = None,
     ) -> None:
-        try:
-            cells = np.asarray(free)
-        except ValueError as error:  # rows of different lengths
-            raise MapError(f"{name}: a map is a 2-D array (H, W): {error}") from error
-        if cells.ndim != 2 or cells.size == 0:
-            raise MapError(
-                f"{name}: a map is a 2-D array (H, W) of at least one pixel, "
-                f"this one has shape {cells.shape}"
-            )
-        check_map_size(cells.shape[1], cells.shape[0], name)
-        if cells.dtype.kind not in "buif":
-            raise MapError(f"{name}: a map holds booleans or numbers, not {cells.dtype}")
-        if cells.dtype.kind == "f" and not np.isfinite(cells).all():
-            raise MapError(f"{name}: the map holds NaN or infinite values")
-        if not (is_finite_number(resolution) and resolution > 0 and isfinite(1 / resolution)):
-            raise MapError(
-                f"{name}: resolution is the length of a pixel in world units and must be "
-                f"positive, got {resolution!r}"
-            )
-        if origin is not None and not (
-            isinstance(origin, Sequence | np.ndarray)
-            and len(origin) == 3
-            and all(map(is_finite_number, origin))
-        ):
-            raise MapError(f"{name}: origin is (x, y, yaw) with finite numbers, got {origin!r}")
-        self.free: NDArray[np.bool_] = np.ascontiguousarray(cells != 0)
-        if not self.free.any():
-            raise MapError(f"{name}: every pixel is blocked, there is nowhere to plan")
+        self.free: NDArray[np.bool_] = check_cells(free, name)
         self.free.setflags(write=False)
-        self.resolution = float(resolution)
-        self.origin = (
-            None if origin is None else (float(origin[0]), float(origin[1]), float(origin[2]))
-        )
+        self.resolution = check_resolution(resolution, name)
+        self.origin = check_origin(origin, name)
         self.name = name
         self.unknown = unknown
+        # The map before it was inflated. Weakly, since that one keeps this one.
+        self._bare: ReferenceType[GridMap] | None = None
+        self._inflated: dict[float, GridMap] = {}
 
     @classmethod
     def load(cls, path: str | PathLike[str], **options: Any) -> GridMap:
@@ -129,8 +91,90 @@ class GridMap:
             MapError: the file is missing, unreadable, truncated, empty or of an unknown kind.
             ConfigError: an unknown option, or one with a value that makes no sense.
         """
-        raw = read_map(path, **options)
+        return cls._of(read_map(path, **options))
+
+    @classmethod
+    def from_occupancy_grid(
+        cls,
+        data: ArrayLike,
+        width: int,
+        height: int,
+        resolution: float,
+        origin: tuple[float, float, float],
+        free_thresh: float = 0.25,
+        unknown_is_free: bool = False,
+        *,
+        name: str = "map",
+    ) -> GridMap:
+        """Make the map of a nav_msgs/OccupancyGrid.
+
+        Args:
+            data: -1 (unknown) or 0 to 100 (percent) for each cell, row by row from the bottom, as
+                in the message, (width * height,).
+            width: columns.
+            height: rows.
+            resolution: metres per cell.
+            origin: pose (x, y, yaw) of the lower left corner, metres and radians.
+            free_thresh: cells up to this probability of an obstacle are free, 0 to 1; 0.25 is
+                nav2's.
+            unknown_is_free: whether unknown cells are free.
+            name: what the map is called in messages and results.
+
+        Raises:
+            MapError: values of another kind or number, or no free cell.
+            ConfigError: a size or threshold that makes no sense.
+
+        Example:
+            >>> grid = GridMap.from_occupancy_grid([0, 100, -1, 0], 2, 2, 0.05, (0.0, 0.0, 0.0))
+            >>> grid.free.tolist()
+            [[False, True], [True, False]]
+        """
+        return cls._of(
+            read_occupancy_grid(
+                data, width, height, resolution, origin, free_thresh, unknown_is_free, name
+            )
+        )
+
+    @classmethod
+    def from_costmap(
+        cls,
+        array: ArrayLike,
+        resolution: float,
+        origin: tuple[float, float, float],
+        lethal: int = 253,
+        unknown_is_free: bool = False,
+        *,
+        name: str = "map",
+    ) -> GridMap:
+        """Make the map of a costmap_2d.
+
+        Args:
+            array: (H, W), costs from 0 to 255, row 0 at the bottom, as the costmap has them.
+            resolution: metres per cell.
+            origin: pose (x, y, yaw) of the lower left corner, metres and radians.
+            lethal: cells of this cost and more are blocked: by default those within the robot's
+                inscribed radius of an obstacle (253) and obstacles (254).
+            unknown_is_free: whether unknown cells (255) are free.
+            name: what the map is called in messages and results.
+
+        Raises:
+            MapError: values of another kind, or no free cell.
+            ConfigError: ``lethal`` is no cost.
+
+        Example:
+            >>> GridMap.from_costmap([[0, 252], [254, 255]], 0.05, (0.0, 0.0, 0.0)).free.tolist()
+            [[False, False], [True, True]]
+        """
+        return cls._of(read_costmap(array, resolution, origin, lethal, unknown_is_free, name))
+
+    @classmethod
+    def _of(cls, raw: RawMap) -> GridMap:
         return cls(raw.free, raw.resolution, raw.origin, name=raw.name, unknown=raw.unknown)
+
+    @property
+    def bare(self) -> GridMap:
+        """The map before it was inflated; the map itself where it was not, or that one is gone."""
+        return (self._bare and self._bare()) or self
 
     @property
     def width(self) -> int:
@@ -160,21 +204,12 @@ class GridMap:
     @cached_property
     def pixel_from_world(self) -> Affine:
         """World (x, y) -> pixel (u, v)."""
-        scale = 1 / self.resolution
-        if self.origin is None:
-            return Affine(scale, 0.0, 0.0, 0.0, scale, 0.0)
-        x, y, yaw = self.origin
-        c, s = cos(yaw) * scale, sin(yaw) * scale
-        return Affine(c, s, -(c * x + s * y), s, -c, self.height - s * x + c * y)
+        return pixel_from_world(self.resolution, self.origin, self.height)
 
     @cached_property
     def world_from_pixel(self) -> Affine:
         """Pixel (u, v) -> world (x, y)."""
-        if self.origin is None:
-            return Affine(self.resolution, 0.0, 0.0, 0.0, self.resolution, 0.0)
-        x, y, yaw = self.origin
-        c, s = cos(yaw) * self.resolution, sin(yaw) * self.resolution
-        return Affine(c, s, x - s * self.height, s, -c, y + c * self.height)
+        return world_from_pixel(self.resolution, self.origin, self.height)
 
     def to_pixel(self, points: ArrayLike) -> NDArray[np.float64]:
         """Return world points, shape (..., 2), as continuous pixel coordinates (u, v)."""
@@ -192,17 +227,21 @@ class GridMap:
         )
         return corners.min(axis=0), corners.max(axis=0)
 
-    def is_free(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """Return whether world points, shape (..., 2), lie in free pixels.
+    def is_free(self, points: ArrayLike) -> Any:
+        """Return whether world points lie in free pixels; outside the map nothing is free.
 
-        Outside the map nothing is free.
+        Args:
+            points: (x, y), world, shape (2,) or (..., 2).
+
+        Returns:
+            A ``bool`` for one point, which OMPL's callbacks may hand on; else an array (...).
         """
         pixels = self.to_pixel(points)
         within = (pixels >= 0) & (pixels < (self.width, self.height))
         inside: NDArray[np.bool_] = np.asarray(within.all(axis=-1))
         indices = np.where(inside[..., None], pixels, 0).astype(np.intp)
-        result: NDArray[np.bool_] = inside & self.free[indices[..., 1], indices[..., 0]]
-        return result
+        result = np.asarray(inside & self.free[indices[..., 1], indices[..., 0]])
+        return bool(result) if result.ndim == 0 else result
 
     def path_is_free(self, path: ArrayLike) -> bool:
         """Return whether a polyline of world points, shape (N, 2), stays in free pixels.
@@ -236,20 +275,20 @@ class GridMap:
             raise MapError(f"the robot radius must be a length of at least 0, got {radius!r}")
         if radius == 0 or self.free.all():
             return self
-        # The gap between two pixels is the distance of their centres with one of them grown by a
-        # pixel all around, so growing the obstacles first makes the distance transform, which
-        # measures between centres, give gaps.
-        grown = cv2.dilate((~self.free).astype(np.uint8), np.ones((3, 3), np.uint8))
-        gap = cv2.distanceTransform(1 - grown, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-        # The factor covers the rounding of float32 and of the division: 1.1 / 0.1 is 11 pixels.
-        free = gap >= radius / self.resolution * (1 - 1e-6)
-        if not free.any():
-            raise MapError(
-                f"{self.name}: a robot of radius {radius} fits nowhere on this map "
-                f"({self.width} x {self.height} pixels of {self.resolution})"
-            )
-        name = f"{self.name} (inflated by {radius:g})"
-        return GridMap(free, self.resolution, self.origin, name=name, unknown=self.unknown)
+        if radius not in self._inflated:
+            free = erode(self.free, radius / self.resolution)
+            if not free.any():
+                raise MapError(
+                    f"{self.name}: a robot of radius {radius} fits nowhere on this map "
+                    f"({self.width} x {self.height} pixels of {self.resolution})"
+                )
+            name = f"{self.name} (inflated by {radius:g})"
+            grown = GridMap(free, self.resolution, self.origin, name=name, unknown=self.unknown)
+            grown._bare = ref(self.bare)
+            if len(self._inflated) == _KEPT_RADII:
+                del self._inflated[next(iter(self._inflated))]
+            self._inflated[radius] = grown
+        return self._inflated[radius]
 
     @cached_property
     def clearance(self) -> NDArray[np.float32]:
@@ -269,48 +308,35 @@ class GridMap:
         """
         return label_components(self.free, connectivity=4)
 
-    def check_task(
-        self, start: ArrayLike, goal: ArrayLike
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def check_task(self, start: ArrayLike, goal: ArrayLike) -> Endpoints:
         """Return start and goal as (2,) arrays, or raise if they cannot be planned for.
 
-        Raises:
-            TaskError: one of them is no point, outside the map or in an obstacle, the two are
-                equal, or no path connects them.
-        """
-        endpoints = self._check_point("start", start), self._check_point("goal", goal)
-        if np.array_equal(*endpoints):
-            raise TaskError(f"start and goal are the same point {_show(endpoints[0])}")
-        (u0, v0), (u1, v1) = self.to_pixel(endpoints).astype(np.intp)
-        if self.components[v0, u0] != self.components[v1, u1]:
-            raise TaskError(
-                f"{self.name}: no path connects start {_show(endpoints[0])} and goal "
-                f"{_show(endpoints[1])}, obstacles separate them; choose both in one "
-                "connected free part"
-            )
-        return endpoints
+        Args:
+            start: (x, y), world.
+            goal: (x, y), world.
 
-    def _check_point(self, role: str, point: ArrayLike) -> NDArray[np.float64]:
-        try:
-            position = np.asarray(point, dtype=np.float64)
-        except (TypeError, ValueError):
-            position = np.empty(0)
-        if position.shape != (2,) or not np.isfinite(position).all():
-            raise TaskError(f"{role} must be two finite numbers x, y in world units, got {point!r}")
-        column, row = np.floor(self.to_pixel(position)).tolist()
-        if not (0 <= column < self.width and 0 <= row < self.height):
-            low, high = self.bounds
-            raise TaskError(
-                f"{role} {_show(position)} is outside {self.name}, which spans "
-                f"x {low[0]:g} to {high[0]:g} and y {low[1]:g} to {high[1]:g}"
-            )
-        column, row = int(column), int(row)
-        if not self.free[row, column]:
-            raise TaskError(
-                f"{role} {_show(position)} is in an obstacle of {self.name} "
-                f"(pixel column {column}, row {row}); choose a free point"
-            )
-        return position
+        Raises:
+            TaskError: one of them is no point, outside the map, in an obstacle, in the margin of
+                one or in unknown space, the two are equal, or no path connects them.
+        """
+        return check_endpoints(self, start, goal)
+
+    def snap(self, point: ArrayLike, distance: float) -> NDArray[np.float64]:
+        """Return a point itself where it is free, else the nearest free position near it.
+
+        Args:
+            point: (x, y), world.
+            distance: the farthest that it is moved, world units.
+
+        Raises:
+            TaskError: it is no point, outside the map, or nothing within the distance is free.
+            ConfigError: the distance is no length.
+
+        Example:
+            >>> GridMap([[0, 0, 1]]).snap((1.5, 0.5), 2.0).round(2).tolist()
+            [2.0, 0.5]
+        """
+        return snap_to_free(self, "the point", point, finite_number("distance", distance, 0.0))
 
     def __repr__(self) -> str:
         frame = "image frame" if self.origin is None else f"origin {self.origin}"
@@ -318,7 +344,3 @@ class GridMap:
             f"GridMap({self.name!r}, {self.width} x {self.height} pixels of {self.resolution:g}, "
             f"{frame}, {self.free.mean():.0%} free)"
         )
-
-
-def _show(point: NDArray[np.float64]) -> str:
-    return f"({point[0]:g}, {point[1]:g})"

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..common.files import read_bytes
-from ..errors import ConfigError, MapError
+from ..errors import ConfigError, MapError, show
 from .image_files import SUFFIXES, decode_image
 from .movingai import read_movingai_map
 from .raw_map import RawMap
@@ -50,9 +50,9 @@ class MapOptions:
     def __post_init__(self) -> None:
         number = isinstance(self.threshold, (int, float)) and not isinstance(self.threshold, bool)
         if not number or not 0 <= self.threshold <= 1:
-            raise ConfigError(f"threshold must be a number from 0 to 1, got {self.threshold!r}")
+            raise ConfigError(f"threshold must be a number from 0 to 1, got {show(self.threshold)}")
         if not isinstance(self.unknown_is_free, bool):
-            raise ConfigError(f"unknown_is_free is True or False, got {self.unknown_is_free!r}")
+            raise ConfigError(f"unknown_is_free is True or False, got {show(self.unknown_is_free)}")
 
 
 def read_map(path: str | os.PathLike[str], **options: Any) -> RawMap:
@@ -69,7 +69,7 @@ def read_map(path: str | os.PathLike[str], **options: Any) -> RawMap:
     known = [field.name for field in fields(MapOptions)]
     for option in options:
         if option not in known:
-            raise ConfigError(f"unknown map option {option!r}; known are {', '.join(known)}")
+            raise ConfigError(f"unknown map option {show(option)}; known are {', '.join(known)}")
     settings = MapOptions(**options)
     if str(path).startswith(BUNDLED):
         return _read_bundled(str(path).removeprefix(BUNDLED), settings)
@@ -108,7 +108,7 @@ def bundled_folder() -> Traversable:
 
 def _read_bundled(name: str, settings: MapOptions) -> RawMap:
     if name not in bundled_maps():
-        raise MapError(f"no map {name!r} is bundled; there are {', '.join(bundled_maps())}")
+        raise MapError(f"no map {show(name)} is bundled; there are {', '.join(bundled_maps())}")
     data = (bundled_folder() / f"{name}.png").read_bytes()
     return _read_image_map(data, BUNDLED + name, name, settings)
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isfinite
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ..errors import MapError
+from ..common.validation import is_finite_number
+from ..errors import MapError, show
+from .frames import Origin
 
 #: Longest side and largest area of a map, in pixels. Larger files are refused before memory is
 #: spent on them: a learned plan takes about 140 bytes a pixel.
@@ -31,7 +35,7 @@ class RawMap:
     free: NDArray[np.bool_]
     name: str
     resolution: float = 1.0
-    origin: tuple[float, float, float] | None = None
+    origin: Origin | None = None
     unknown: NDArray[np.bool_] | None = None
 
 
@@ -51,3 +55,71 @@ def check_map_size(width: int, height: int, name: str) -> None:
             f"{name}: {width} x {height} pixels; maps up to {MAX_SIDE} pixels a side and "
             f"{MAX_PIXELS} pixels in all are supported, scale it down first"
         )
+
+
+def check_cells(free: ArrayLike, name: str) -> NDArray[np.bool_]:
+    """Return the cells of a map as a new array of truth values.
+
+    Args:
+        free: shape (H, W), truth values, or 1 where free and 0 where blocked.
+        name: what to call the map in the message.
+
+    Raises:
+        MapError: anything else, too many cells, or none that is free.
+    """
+    try:
+        cells = np.asarray(free)
+    except Exception as error:  # rows of different lengths, and whatever odd classes raise
+        raise MapError(f"{name}: a map is a 2-D array (H, W): {error}") from error
+    if cells.ndim != 2 or cells.size == 0:
+        raise MapError(
+            f"{name}: a map is a 2-D array (H, W) of at least one pixel, "
+            f"this one has shape {cells.shape}"
+        )
+    check_map_size(cells.shape[1], cells.shape[0], name)
+    if cells.dtype.kind not in "buif":
+        raise MapError(f"{name}: a map holds booleans or numbers, not {cells.dtype}")
+    if cells.dtype.kind == "f" and not np.isfinite(cells).all():
+        raise MapError(f"{name}: the map holds NaN or infinite values")
+    if cells.dtype.kind != "b" and ((cells != 0) & (cells != 1)).any():
+        raise MapError(
+            f"{name}: a map holds truth values, or 1 where free and 0 where blocked, these span "
+            f"{cells.min():g} to {cells.max():g}; occupancy grids are read by "
+            "GridMap.from_occupancy_grid, costmaps by GridMap.from_costmap, anything else is "
+            "compared first, as in GridMap(image > 127)"
+        )
+    mask: NDArray[np.bool_] = np.ascontiguousarray(cells != 0)
+    if not mask.any():
+        raise MapError(f"{name}: every pixel is blocked, there is nowhere to plan")
+    return mask
+
+
+def check_resolution(resolution: float, name: str) -> float:
+    """Return a resolution as a float.
+
+    Raises:
+        MapError: it is no positive length, or one whose inverse is infinite.
+    """
+    if not (is_finite_number(resolution) and resolution > 0 and isfinite(1 / float(resolution))):
+        raise MapError(
+            f"{name}: resolution is the length of a pixel in world units and must be "
+            f"positive, got {show(resolution)}"
+        )
+    return float(resolution)
+
+
+def check_origin(origin: Origin | None, name: str) -> Origin | None:
+    """Return an origin as three floats, or None.
+
+    Raises:
+        MapError: it is neither None nor three finite numbers.
+    """
+    if origin is None:
+        return None
+    if not (
+        isinstance(origin, Sequence | np.ndarray)
+        and len(origin) == 3
+        and all(map(is_finite_number, origin))
+    ):
+        raise MapError(f"{name}: origin is (x, y, yaw) with finite numbers, got {show(origin)}")
+    return float(origin[0]), float(origin[1]), float(origin[2])

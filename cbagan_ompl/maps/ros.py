@@ -23,11 +23,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
 from ..common.files import read_bytes
-from ..errors import MapError
+from ..common.yaml_text import MAX_YAML_BYTES, parse_yaml
+from ..errors import MapError, show
 from .image_files import DecodedImage, decode_image
 from .raw_map import RawMap
 
@@ -40,11 +40,8 @@ class _Description:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        try:
-            # Odd dates are a ValueError, endless nesting is a RecursionError.
-            keys = yaml.safe_load(read_bytes(path))
-        except (yaml.YAMLError, ValueError, RecursionError) as error:
-            raise MapError(f"Failed to read {path}: no valid YAML: {error}") from error
+        data = read_bytes(path, limit=MAX_YAML_BYTES)
+        keys = parse_yaml(data, f"Failed to read {path}", MapError)
         if not isinstance(keys, dict):
             raise MapError(
                 f"Failed to read {path}: a map_server file has the keys {', '.join(_REQUIRED)}; "
@@ -56,7 +53,9 @@ class _Description:
         self.keys: dict[Any, Any] = keys
 
     def error(self, key: str, reason: str) -> MapError:
-        return MapError(f"Failed to read {self.path}, key '{key}' = {self.keys[key]!r}: {reason}")
+        return MapError(
+            f"Failed to read {self.path}, key '{key}' = {show(self.keys[key])}: {reason}"
+        )
 
     def _number(self, key: str, value: object) -> float:
         # PyYAML takes 5e-2 for a string (YAML 1.1 wants 5.0e-2), the parser of ROS for a number.
@@ -67,7 +66,7 @@ class _Description:
                 number = float("nan")
             if isfinite(number):
                 return number
-        raise self.error(key, f"expected finite numbers, got {value!r}")
+        raise self.error(key, f"expected finite numbers, got {show(value)}")
 
     @property
     def resolution(self) -> float:
@@ -116,7 +115,7 @@ class _Description:
         file = self.keys["image"]
         if not isinstance(file, str) or not file:
             raise self.error("image", "must be the path of an image, relative to this file")
-        path = self.path.parent / file
+        path = self.path.parent / Path(file).expanduser()
         try:
             return decode_image(read_bytes(path), str(path))
         except MapError as error:

@@ -43,7 +43,8 @@ def load_tasks(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
     r"""Read the tasks for a map from a MovingAI ``.scen`` or a ``.csv`` file.
 
     A ``.scen`` file belongs to one map, whose name is not compared. Its cells become the centres
-    of pixels, scaled when the file was made for another size of the map. ``optimal_cost`` stays
+    of pixels, scaled when the file was made for another size of the map in the same
+    proportions. ``optimal_cost`` stays
     empty: the length in the file is that of the best path along the eight directions of the grid,
     and a path in any direction may be shorter.
 
@@ -116,6 +117,14 @@ def tasks_of(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
 def _scen_tasks(path: Path, grid: GridMap) -> list[Task]:
     tasks = []
     for scenario in read_scenarios(path):
+        # A scaled map may be a pixel off in one of its sides.
+        skew = grid.width * scenario.height - grid.height * scenario.width
+        if abs(skew) > max(scenario.width, scenario.height):
+            raise MapError(
+                f"{path}: made for a map of {scenario.width} x {scenario.height} cells, "
+                f"{grid.name} has {grid.width} x {grid.height} pixels: sizes in other proportions, "
+                "so this is another map, or width and height are exchanged"
+            )
         # In whole numbers: the pixel that the centre of the scaled cell lies in.
         pixels = [
             (

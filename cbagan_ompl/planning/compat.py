@@ -6,8 +6,6 @@ what the bindings offer, not by version number, so that a build that binds more 
 
 from __future__ import annotations
 
-import ctypes
-import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
@@ -21,8 +19,6 @@ from numpy.typing import NDArray
 
 from ..errors import MissingDependencyError, PlannerError
 
-_OMPL_WAS_LOADED = "ompl.util" in sys.modules
-
 try:
     import ompl
 except ImportError as error:  # pragma: no cover - ompl is a declared dependency
@@ -32,10 +28,6 @@ except ImportError as error:  # pragma: no cover - ompl is a declared dependency
 BOOST_PYTHON = hasattr(ompl, "dll_loader")
 #: The generation of the bindings: "boost" (OMPL 1.7) or "nanobind" (2.0).
 BINDINGS = "boost" if BOOST_PYTHON else "nanobind"
-if BOOST_PYTHON and not _OMPL_WAS_LOADED:
-    # ompl.util preloads a second copy of libompl; its static objects are then destroyed twice,
-    # and the interpreter crashes at exit. The first copy is all that is needed.
-    ompl.dll_loader = lambda *_: None
 
 from ompl import base as ob  # noqa: E402
 from ompl import geometric as og  # noqa: E402
@@ -61,23 +53,6 @@ def ompl_version() -> str:
         return version("ompl")
     except PackageNotFoundError:
         return "unknown"
-
-
-def _skip_static_destructors() -> None:
-    """Leave the process right after Python's own shutdown, with its exit status.
-
-    For OMPL 1.x when the script imported ompl before this package: the second copy of libompl is
-    loaded by then, and only skipping the destructors of both copies avoids the crash at exit.
-    glibc calls the handlers last in, first out: C streams are flushed, then ``_exit(status)``.
-    """
-    libc = ctypes.CDLL(None)
-    if hasattr(libc, "on_exit"):
-        for handler in ("_exit", "fcloseall"):
-            libc.on_exit(ctypes.cast(getattr(libc, handler), ctypes.c_void_p), None)
-
-
-if BOOST_PYTHON and _OMPL_WAS_LOADED:
-    _skip_static_destructors()
 
 
 def _wrap(wrapper: str, function: Callable[..., Any], home: Any = ob) -> Any:

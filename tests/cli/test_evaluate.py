@@ -45,7 +45,9 @@ def test_evaluate_command(
     table = capsys.readouterr().out
     assert "not FID" in table
     result = json.loads((tmp_path / "out" / "evaluation.json").read_text())
-    assert result == json.loads((tmp_path / "s.json").read_text())
+    report = json.loads((tmp_path / "s.json").read_text())
+    assert report.pop("made_by").startswith("cbagan-ompl ")
+    assert result == report
     predictions = result["predictions"]
     assert list(predictions) == ["tiny", "own", "all free space", "straight line"]
     assert predictions["own"]["scores"]["iou"] == 1

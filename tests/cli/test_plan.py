@@ -192,3 +192,55 @@ def test_no_tree(tmp_path: Path) -> None:
         assert main([*QUICK, "--seed", "0", "--output", str(path), *words]) == 0
         sizes.append(path.stat().st_size)
     assert sizes[1] < sizes[0]
+
+
+@pytest.mark.parametrize("suffix", ["png", "pdf", "svg", "jpg"])
+def test_only_figures_of_our_own_are_replaced(
+    tmp_path: Path, suffix: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / f"plan.{suffix}"
+    path.write_bytes(b"somebody's holiday")
+    assert main([*QUICK, "--output", str(path)]) == 2
+    assert "say --force" in capsys.readouterr().err
+    assert path.read_bytes() == b"somebody's holiday"
+    assert main([*QUICK, "--output", str(path), "--force"]) == 0
+    assert main([*QUICK, "--output", str(path)]) == 0, "ours"
+
+
+def test_no_input_is_replaced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "map.png"
+    cv2.imwrite(str(path), np.full((40, 40), 255, np.uint8))
+    before = path.read_bytes()
+    words = ["plan", str(path), "--start", "5,5", "--goal", "35,35", "--sampler", "uniform"]
+    for option in ("--output", "--json"):
+        for force in ([], ["--force"]):
+            assert main([*words, option, str(path), *force]) == 2
+            assert "it is what the command reads" in capsys.readouterr().err
+    assert path.read_bytes() == before
+
+
+def test_reports_are_replaced_by_reports_alone(tmp_path: Path) -> None:
+    path = tmp_path / "plan.json"
+    path.write_text('{"mine": 1}')
+    assert main([*QUICK, "--json", str(path)]) == 2
+    path.unlink()
+    for _ in range(2):
+        assert main([*QUICK, "--json", str(path)]) == 0
+    assert json.loads(path.read_text())["made_by"].startswith("cbagan-ompl ")
+
+
+def test_our_own_errors_have_a_status_of_their_own(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import cbagan_ompl.planning.plan
+
+    def broken(*_: object, **__: object) -> None:
+        raise ZeroDivisionError("by zero")
+
+    monkeypatch.setattr(cbagan_ompl.planning.plan, "plan", broken)
+    assert main(QUICK) == 70
+    said = capsys.readouterr().err
+    assert "an error of cbagan-ompl itself: ZeroDivisionError: by zero" in said
+    assert "Traceback" not in said
+    assert main([*QUICK, "--debug"]) == 70
+    assert "Traceback" in capsys.readouterr().err

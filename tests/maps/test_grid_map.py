@@ -255,7 +255,7 @@ def test_the_map_is_a_read_only_copy():
 
 
 def test_shape_and_repr():
-    grid = GridMap([[255, 0, 1]], 0.05, (1, 2, 0), name="hall")
+    grid = GridMap([[1, 0, 1]], 0.05, (1, 2, 0), name="hall")
     assert (grid.width, grid.height, grid.shape) == (3, 1, (1, 3))
     assert repr(grid) == ("GridMap('hall', 3 x 1 pixels of 0.05, origin (1.0, 2.0, 0.0), 67% free)")
     assert "image frame" in repr(GridMap([[1]]))

@@ -158,3 +158,12 @@ def test_bundled_tasks_can_be_planned_for(name):
         assert np.hypot(*(goal - start)) > 50
         assert not grid.path_is_free([start, goal])
         assert grid.inflated(1.0).is_free([start, goal]).all()  # not scraping along a wall
+
+
+def test_scenarios_of_other_proportions_belong_to_another_map(tmp_path):
+    path = tmp_path / "arena.scen"
+    path.write_text("version 1\n0\tarena.map\t30\t20\t1\t1\t25\t15\t30\n")
+    assert len(load_tasks(path, GridMap(np.ones((40, 60), bool)))) == 1
+    assert len(load_tasks(path, GridMap(np.ones((41, 60), bool)))) == 1, "rounded when scaled"
+    with pytest.raises(MapError, match="sizes in other proportions"):
+        load_tasks(path, GridMap(np.ones((30, 20), bool)))

@@ -76,3 +76,24 @@ def run(script: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, timeout=300, check=False
     )
+
+
+@pytest.mark.parametrize(
+    "imports",
+    [
+        "import cbagan_ompl\nfrom ompl import base as ob\n",
+        "from ompl import base as ob\nimport cbagan_ompl\n",
+        "import ompl\nimport cbagan_ompl\nimport ompl.geometric\nfrom ompl import base as ob\n",
+        "import cbagan_ompl\nimport ompl\nimport ompl.util\nfrom ompl import base as ob\n",
+    ],
+)
+@pytest.mark.parametrize(
+    "work",
+    [
+        "cbagan_ompl.GridMap([[1, 1]])\nspace = ob.RealVectorStateSpace(2)\n",
+        "space = ob.RealVectorStateSpace(2)\n",
+    ],
+)
+def test_the_import_alone_protects_the_exit(imports: str, work: str) -> None:
+    done = run(imports + work + "print('done')\n")
+    assert (done.returncode, done.stdout) == (0, "done\n"), done.stderr

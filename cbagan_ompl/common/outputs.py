@@ -1,0 +1,60 @@
+"""What may be written over: never an input, and nobody else's file unless that is asked for."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from .. import __version__
+from ..errors import ConfigError
+from .files import check_folder, open_regular, write_json
+
+#: What every file of ours says of itself, near its begin or its end.
+MADE_BY = f"cbagan-ompl {__version__}"
+_SIGNATURE = b"cbagan-ompl"
+_SEARCHED = 2**16
+
+
+def check_output(
+    path: str | None, inputs: Iterable[str | os.PathLike[str]] = (), *, force: bool = False
+) -> None:
+    """Raise if a file cannot be written, or would replace what it must not, before any work.
+
+    Args:
+        path: of the file; None when none is wanted.
+        inputs: files that the command reads; others than files are passed over.
+        force: whether files that are not ours may be replaced. Inputs never are.
+
+    Raises:
+        ConfigError: the folder does not exist, the file is an input, or it is not ours.
+    """
+    check_folder(path)
+    if path is None or not os.path.lexists(path):
+        return
+    for given in inputs:
+        if os.path.exists(given) and os.path.samefile(given, path):
+            raise ConfigError(f"cannot write {path}: it is what the command reads")
+    if not force and not _is_ours(Path(path)):
+        raise ConfigError(
+            f"cannot write {path}: it exists, and is not known to be written by cbagan-ompl; "
+            "choose another name, or say --force"
+        )
+
+
+def write_report(path: str, values: Mapping[str, Any]) -> None:
+    """Write values as JSON, with a first entry that says what wrote them.
+
+    Raises:
+        ConfigError: the file cannot be written.
+    """
+    write_json(path, {"made_by": MADE_BY, **values})
+
+
+def _is_ours(path: Path) -> bool:
+    with open_regular(path, ConfigError) as file:
+        if _SIGNATURE in file.read(_SEARCHED):
+            return True
+        file.seek(max(0, os.fstat(file.fileno()).st_size - _SEARCHED))
+        return _SIGNATURE in file.read(_SEARCHED)

@@ -1,0 +1,110 @@
+"""Start and goal on a map: whether they can be planned for, and the nearest places that can."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import TaskError, show
+
+if TYPE_CHECKING:
+    from .grid_map import GridMap
+
+#: Start and goal as positions (x, y) in world coordinates, (2,) each.
+Endpoints = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+
+def check_endpoints(grid: GridMap, start: ArrayLike, goal: ArrayLike) -> Endpoints:
+    """Return start and goal as arrays; see :meth:`cbagan_ompl.GridMap.check_task`."""
+    endpoints = _check_free(grid, "start", start), _check_free(grid, "goal", goal)
+    if np.array_equal(*endpoints):
+        raise TaskError(f"start and goal are the same point {_format(endpoints[0])}")
+    (u0, v0), (u1, v1) = grid.to_pixel(endpoints).astype(np.intp)
+    if grid.components[v0, u0] != grid.components[v1, u1]:
+        raise TaskError(
+            f"{grid.name}: no path connects start {_format(endpoints[0])} and goal "
+            f"{_format(endpoints[1])}, obstacles separate them; choose both in one "
+            "connected free part"
+        )
+    return endpoints
+
+
+def snap_to_free(
+    grid: GridMap, role: str, point: ArrayLike, distance: float
+) -> NDArray[np.float64]:
+    """Return a point itself where it is free, else the nearest free position within a distance.
+
+    Args:
+        grid: the map.
+        role: "start" or "goal", for messages.
+        point: (x, y), world.
+        distance: the farthest that it is moved, world units.
+
+    Raises:
+        TaskError: it is no point, outside the map, or nothing within the distance is free.
+    """
+    position = _check_position(grid, role, point)
+    if grid.is_free(position):
+        return position
+    centre = grid.to_pixel(position)
+    reach = distance / grid.resolution
+    left, top = np.maximum(np.floor(centre - reach), 0).astype(int)
+    right, bottom = np.minimum(np.ceil(centre + reach), (grid.width, grid.height)).astype(int)
+    rows, columns = np.nonzero(grid.free[top:bottom, left:right])
+    # The point of each free pixel that is nearest, a little inside of it.
+    corners = np.stack((columns + left, rows + top), axis=-1)
+    nearest = np.clip(centre, corners + 1e-3, corners + 1 - 1e-3)
+    distances = np.hypot(*(nearest - centre).T)
+    if not len(distances) or distances.min() > reach:
+        raise TaskError(
+            f"{role} {_format(position)} is {_describe_blocked(grid, position)}, and nothing "
+            f"within {distance:g} of it is free; choose another, or snap it from farther away"
+        )
+    return np.asarray(grid.to_world(nearest[int(distances.argmin())]), np.float64)
+
+
+def _check_free(grid: GridMap, role: str, point: ArrayLike) -> NDArray[np.float64]:
+    position = _check_position(grid, role, point)
+    column, row = np.floor(grid.to_pixel(position)).astype(int).tolist()
+    if not grid.free[row, column]:
+        raise TaskError(
+            f"{role} {_format(position)} is {_describe_blocked(grid, position)} "
+            f"(pixel column {column}, row {row}); choose a free point, or let it be moved to the "
+            "nearest one with snap"
+        )
+    return position
+
+
+def _check_position(grid: GridMap, role: str, point: ArrayLike) -> NDArray[np.float64]:
+    try:
+        given = np.asarray(point)
+        position = given.astype(np.float64) if given.dtype.kind in "iufO" else np.empty(0)
+    except Exception:  # whatever the classes of odd values raise
+        position = np.empty(0)
+    if position.shape != (2,) or not np.isfinite(position).all():
+        raise TaskError(f"{role} must be two finite numbers x, y in world units, got {show(point)}")
+    column, row = np.floor(grid.to_pixel(position)).tolist()
+    if not (0 <= column < grid.width and 0 <= row < grid.height):
+        low, high = grid.bounds
+        raise TaskError(
+            f"{role} {_format(position)} is outside {grid.name}, which spans "
+            f"x {low[0]:g} to {high[0]:g} and y {low[1]:g} to {high[1]:g}"
+        )
+    return position
+
+
+def _describe_blocked(grid: GridMap, position: NDArray[np.float64]) -> str:
+    """Return what is at a blocked position: a wall, the margin around one, or unknown space."""
+    column, row = np.floor(grid.to_pixel(position)).astype(int).tolist()
+    bare = grid.bare
+    if bare is not grid and bare.free[row, column]:
+        return f"too close to an obstacle of {bare.name} for the robot's radius"
+    if bare.unknown is not None and bare.unknown[row, column]:
+        return f"in unknown space of {bare.name}"
+    return f"in an obstacle of {bare.name}"
+
+
+def _format(point: NDArray[np.float64]) -> str:
+    return f"({point[0]:g}, {point[1]:g})"

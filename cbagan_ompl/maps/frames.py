@@ -1,0 +1,55 @@
+"""The two frames of a map: pixels and world; see :class:`cbagan_ompl.GridMap`."""
+
+from __future__ import annotations
+
+from math import cos, sin
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: Pose (x, y, yaw) of the lower left corner of a map in the ROS frame.
+Origin = tuple[float, float, float]
+
+
+class Affine(NamedTuple):
+    """The affine function (x, y) -> (a x + b y + c, d x + e y + f)."""
+
+    a: float
+    b: float
+    c: float
+    d: float
+    e: float
+    f: float
+
+    def __call__(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Apply to points, shape (..., 2)."""
+        x, y = points[..., 0], points[..., 1]
+        return np.stack(
+            (self.a * x + self.b * y + self.c, self.d * x + self.e * y + self.f), axis=-1
+        )
+
+
+def pixel_from_world(resolution: float, origin: Origin | None, height: int) -> Affine:
+    """Return the function from world (x, y) to pixel (u, v).
+
+    Args:
+        resolution: world units per pixel.
+        origin: None for the image frame.
+        height: of the map, in pixels.
+    """
+    scale = 1 / resolution
+    if origin is None:
+        return Affine(scale, 0.0, 0.0, 0.0, scale, 0.0)
+    x, y, yaw = origin
+    c, s = cos(yaw) * scale, sin(yaw) * scale
+    return Affine(c, s, -(c * x + s * y), s, -c, height - s * x + c * y)
+
+
+def world_from_pixel(resolution: float, origin: Origin | None, height: int) -> Affine:
+    """Return the function from pixel (u, v) to world (x, y); arguments as above."""
+    if origin is None:
+        return Affine(resolution, 0.0, 0.0, 0.0, resolution, 0.0)
+    x, y, yaw = origin
+    c, s = cos(yaw) * resolution, sin(yaw) * resolution
+    return Affine(c, s, x - s * height, s, -c, y + c * height)
