@@ -140,7 +140,8 @@ def inception_features(
         ) from error
     if result.ndim != 2 or len(result) != len(regions) or not np.isfinite(result).all():
         raise ModelError(
-            f"{path}: gives features of shape {result.shape}, or some that are not finite; {expected}"
+            f"{path}: gives features of shape {result.shape}, or some that are not finite; "
+            f"{expected}"
         )
     return result
 

@@ -94,7 +94,7 @@ class _Global(NamedTuple):
 class _Storage(NamedTuple):
     """The numbers that tensors share."""
 
-    count: int
+    length: int
 
 
 class _Tuple(tuple[Any, ...]):
@@ -164,7 +164,7 @@ class _Reader:
         value = self._make(opcode, argument)
         self._stacks[-1].append(value)
 
-    def _make(self, opcode: str, argument: Any) -> Any:
+    def _make(self, opcode: str, argument: Any) -> Any:  # noqa: C901 (a parser)
         """Return the value that an opcode puts on the stack."""
         match opcode:
             case "NONE" | "NEWTRUE" | "NEWFALSE" | "BINFLOAT":
@@ -257,7 +257,7 @@ def _check_tensor(arguments: Sequence[Any]) -> None:
     ):
         count = prod(shape)
         last = offset + sum((n - 1) * s for n, s in zip(shape, strides, strict=True))
-        if count == 0 or (count <= storage.count and last < storage.count):
+        if count == 0 or (count <= storage.length and last < storage.length):
             return
     raise ValueError("a tensor does not lie in its storage")
 

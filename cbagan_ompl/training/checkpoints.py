@@ -16,7 +16,7 @@ from ..inference.archives import Archive
 from ..inference.model_files import translate_damage
 from ..inference.tensor_pickles import check_group
 from ..networks.config import MAX_IMAGE_SIZE, MAX_WEIGHTS
-from ..networks.factory import make_generator
+from ..networks.factory import check_weights, make_generator
 from ..networks.generator import Generator
 from ..networks.patch_generator import PatchGenerator
 from .config import TrainingConfig
@@ -49,7 +49,7 @@ _FORM: dict[str, Any] = {
         "train_tasks": int,
         "test_tasks": int,
     },
-    "gan": dict.fromkeys((*_NETWORKS, "optimizers"), {}),
+    "gan": {name: {} for name in (*_NETWORKS, "optimizers")},
     "rng": str,
     "noise_rng": torch.Tensor,
     "history": [{"epoch": int, "losses": {}, "validation": _SCORES}],
@@ -85,7 +85,7 @@ def load_checkpoint(path: str | PathLike[str]) -> dict[str, Any]:
         is_model = "constants.pkl" in archive.sizes
         if not is_model:
             check_group(archive, "data")
-            state = torch.load(io.BytesIO(data), map_location="cpu", weights_only=True)
+            state: Any = torch.load(io.BytesIO(data), map_location="cpu", weights_only=True)
     if is_model:
         raise ModelError(f"{source}: an exported model, not a training checkpoint")
     schema = state.get("schema") if isinstance(state, dict) else None
@@ -103,8 +103,8 @@ def load_checkpoint(path: str | PathLike[str]) -> dict[str, Any]:
         )
     _check_form(state, source)
     with translate_damage(source, "damaged, its configuration is none"):
-        state["config"] = TrainingConfig().updated(state["config"]).to_dict()
-    return state
+        config = TrainingConfig().updated(state["config"])
+    return {**state, "config": config.to_dict()}
 
 
 def best_generator(
@@ -121,6 +121,7 @@ def best_generator(
     """
     with translate_damage(Path(path), "damaged, its weights do not fit its configuration"):
         config = TrainingConfig().updated(state["config"])
+        check_weights(config.network)
         generator = make_generator(config.network)
         generator.load_state_dict(state["gan"]["average" if config.ema_decay else "generator"])
     return generator.eval()

@@ -14,7 +14,8 @@ from typing import Any
 import torch
 from torch import nn
 
-from ..common.files import check_no_input, make_folder, read_bytes, read_text, write_atomically
+from ..common.files import make_folder, read_bytes, read_text, write_atomically
+from ..common.outputs import check_output
 from ..errors import ModelError, show
 from ..inference.archives import Archive
 from ..inference.model_files import (
@@ -81,8 +82,8 @@ def export(
     state = load_checkpoint(checkpoint)
     generator = best_generator(state, checkpoint)
     record = make_record(target.stem, state, generator, note)
-    _check_outputs(target, Path(checkpoint), force)
     make_folder(target.parent, ModelError)
+    _check_outputs(target, Path(checkpoint), force)
     model = RegionModel(generator).eval()
     # Convolutions in this layout take four fifths of the time on a CPU.
     model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
@@ -99,7 +100,7 @@ def _check_outputs(model: Path, checkpoint: Path, force: bool) -> None:
         (model.with_suffix(".md"), _is_card),
         (model.parent / MANIFEST, _is_manifest),
     ):
-        check_no_input(path, [checkpoint], ModelError)
+        check_output(str(path), [checkpoint], force=True)
         if path.exists() and not force and not is_ours(path):
             raise ModelError(
                 f"{path} exists, and `cbagan-ompl export` did not write it; choose another "

@@ -45,7 +45,7 @@ def test_config_file_round_trip(tmp_path: Path, suffix: str) -> None:
         ("seed: 99999999999999999999", r"seed must be .* below 2\*\*63"),
         ("{self_attention: true, widths: [8, 8, 7, 8]}", "all widths but the first .* least 8"),
         ("[1, 2]", "holds lines such as"),
-        ("a: [", "neither JSON nor YAML"),
+        ("a: [", "no valid YAML"),
     ],
 )
 def test_bad_config_files(tmp_path: Path, text: str, message: str) -> None:
@@ -89,7 +89,7 @@ def test_assignments() -> None:
     ("assignment", "message"),
     [
         ("epochs", "--set takes KEY=VALUE, got 'epochs'"),
-        ("widths=[", r"--set widths=\[: neither JSON nor YAML"),
+        ("widths=[", r"--set 'widths=\[': no valid YAML"),
         ("epoch=1", "unknown option 'epoch'"),
         ("positive_weight=-0.5", "positive_weight must be at least 0"),
     ],
