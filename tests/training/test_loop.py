@@ -12,7 +12,7 @@ from helpers.tiny_model import TINY
 
 torch = pytest.importorskip("torch")
 
-from cbagan_ompl import ConfigError, ModelError
+from cbagan_ompl import ConfigError
 from cbagan_ompl.training import loop
 from cbagan_ompl.training.checkpoints import load_checkpoint
 from cbagan_ompl.training.loop import train
