@@ -73,7 +73,7 @@ class Archive:
 def _check_layout(members: list[zipfile.ZipInfo], data: bytes) -> None:
     """Raise if the members, sorted by their places, overlap, expand, or cannot be read."""
     if not members or members[0].header_offset != 0 or not data.startswith(_HEADER):
-        raise ValueError("something lies before its first member")
+        raise ValueError("its members are not where its directory says")
     for member in members:
         if member.flag_bits & _ENCRYPTED:
             raise ValueError("a member is encrypted")

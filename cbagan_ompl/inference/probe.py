@@ -18,7 +18,7 @@ from ..errors import ModelError
 
 #: Time on a processor for loading and one prediction, and the memory for it beyond torch's own and
 #: some copies of the file.
-MAX_SECONDS, MAX_MEMORY = 4, 2**29
+MAX_SECONDS, MAX_MEMORY = 2, 2**29
 _COPIES = 3
 
 # Against a machine that stands still: what a model may take is measured on the processor.
