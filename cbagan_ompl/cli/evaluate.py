@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..common.files import make_folder, write_atomically
-from ..common.outputs import MADE_BY, check_output, write_report
+from ..common.outputs import check_output, write_report
 from ..common.validation import check_at_least
 from ..errors import ConfigError, show
 
@@ -164,10 +164,13 @@ def _check_outputs(
     for source in (args.dataset, *(source for _, source in stored)):
         if folder.exists() and folder.samefile(source):
             raise ConfigError(f"cannot write to {folder}: it is what the command reads")
-    for name in (_TABLE, _RESULT, *(f"{name}.png" for name in names)):
+    if folder.is_dir():
         inputs = [*(args.model or []), *([args.inception] if args.inception else [])]
-        if folder.is_dir():
+        for name in (_RESULT, *(f"{name}.png" for name in names)):
             check_output(str(folder / name), inputs, force=args.force)
+        # The table does not say what wrote it; its result is ours, if there is one.
+        is_ours = (folder / _RESULT).exists()
+        check_output(str(folder / _TABLE), inputs, force=args.force or is_ours)
     make_folder(folder)
 
 
@@ -176,7 +179,7 @@ def _save(
 ) -> None:
     from ..evaluation.sample_grid import save_sample_grid
 
-    write_atomically(folder / _TABLE, f"{table}\nMade by {MADE_BY}.\n")
+    write_atomically(folder / _TABLE, table)
     write_report(str(folder / _RESULT), result)
     for evaluation in evaluations:
         save_sample_grid(evaluation, tasks, folder / f"{evaluation.name}.png")

@@ -10,8 +10,8 @@ from typing import Any
 
 import torch
 
-from ..common.files import read_bytes, write_atomically
-from ..errors import ModelError
+from ..common.files import as_path, read_bytes, write_atomically
+from ..errors import ModelError, show
 from ..inference.archives import Archive
 from ..inference.model_files import translate_damage
 from ..inference.tensor_pickles import check_group
@@ -76,8 +76,8 @@ def load_checkpoint(path: str | PathLike[str]) -> dict[str, Any]:
     Raises:
         ModelError: the file is missing, no training checkpoint, damaged, or of another version.
     """
-    source = Path(path)
-    if not source.is_file():
+    source = as_path(path, ModelError)
+    if not source.exists():
         raise ModelError(f"{source}: no such file; `cbagan-ompl train` writes {LAST} and {BEST}")
     data = read_bytes(source, ModelError, MAX_CHECKPOINT_BYTES)
     with translate_damage(source, "not a training checkpoint, or a damaged one"):
@@ -138,6 +138,10 @@ def _check_form(state: dict[str, Any], path: Path) -> None:
         wrong = _find_mismatch(state["trivial"], dict.fromkeys(state["trivial"], _SCORES))
     if wrong is not None:
         raise ModelError(f"{path}: damaged, its entry {wrong} is missing or of another kind")
+    for name in _NETWORKS:
+        for key, weights in state["gan"][name].items():
+            if not isinstance(weights, torch.Tensor) or not torch.isfinite(weights).all():
+                raise ModelError(f"{path}: damaged, the weights {show(key)} are not finite numbers")
     with translate_damage(path, "damaged, it has values where texts and numbers should be"):
         json.dumps([state.get(name) for name in _DESCRIPTIONS])
 

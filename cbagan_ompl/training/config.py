@@ -11,10 +11,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
-from ..common.files import read_bytes
+from ..common.files import as_path, read_bytes
 from ..common.yaml_text import MAX_YAML_BYTES, parse_yaml
 from ..errors import ConfigError, show
 from ..networks.config import (
@@ -157,7 +156,7 @@ class TrainingConfig:
             ConfigError: the file is missing, cannot be parsed, holds an unknown option, or a value
                 of the wrong type or out of range.
         """
-        text = read_bytes(Path(path), ConfigError, MAX_YAML_BYTES)
+        text = read_bytes(as_path(path), ConfigError, MAX_YAML_BYTES)
         values = parse_yaml(text, str(path), ConfigError)
         if not isinstance(values, dict):
             raise ConfigError(f"{path}: a configuration holds lines such as 'epochs: 20'")

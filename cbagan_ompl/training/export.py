@@ -14,7 +14,7 @@ from typing import Any
 import torch
 from torch import nn
 
-from ..common.files import make_folder, read_bytes, read_text, write_atomically
+from ..common.files import as_path, make_folder, read_bytes, read_text, write_atomically
 from ..common.outputs import check_output
 from ..errors import ModelError, show
 from ..inference.archives import Archive
@@ -71,7 +71,7 @@ def export(
         ModelError: the checkpoint cannot be read, the file cannot be written, has another suffix,
             or a name that is too long or not printable; or a file would be lost.
     """
-    target = Path(path)
+    target = as_path(path, ModelError)
     if target.suffix != ".pt":
         raise ModelError(f"{target}: the name of an exported model ends in .pt")
     if not target.stem.isprintable() or len(target.stem) > MAX_NAME_LENGTH:
@@ -83,7 +83,7 @@ def export(
     generator = best_generator(state, checkpoint)
     record = make_record(target.stem, state, generator, note)
     make_folder(target.parent, ModelError)
-    _check_outputs(target, Path(checkpoint), force)
+    _check_outputs(target, as_path(checkpoint), force)
     model = RegionModel(generator).eval()
     # Convolutions in this layout take four fifths of the time on a CPU.
     model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]

@@ -15,7 +15,7 @@ import torch
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from ..common.files import make_folder, write_atomically
+from ..common.files import as_path, make_folder, write_atomically
 from ..datasets.dataset import Tasks
 from ..errors import ConfigError, show
 from ..inference.model_files import translate_damage
@@ -109,7 +109,7 @@ def train(
         MissingDependencyError: ``tensorboard`` without the package of that name.
         ModelError: a checkpoint that cannot be read or written.
     """
-    folder, target = Path(output), pick_device(device)
+    folder, target = as_path(output), pick_device(device)
     check_trainable(source.size, config)
     with process_group(target) as group:
         if config.batch_size % group.size:
