@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -38,6 +39,40 @@ def fork_server(preload: Sequence[str] = ()) -> ForkServerContext:
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
     return context
+
+
+def prepare_worker() -> None:
+    """Let SIGTERM end this process at work, but not while it sends a result: an initializer.
+
+    Of half a result the process that reads it would wait for the rest without end.
+    """
+    signal.signal(signal.SIGTERM, _end_unless_sending)
+
+
+def run_call(work: Callable[..., T], *arguments: Any) -> T:
+    """Return the result of a call in a process that :func:`prepare_worker` has prepared."""
+    _state.is_working = True
+    if _state.is_ending:
+        os._exit(1)
+    try:
+        return work(*arguments)
+    finally:
+        _state.is_working = False
+
+
+class _WorkerState:
+    """What the signal handler of a worker process needs to know."""
+
+    is_working = is_ending = False
+
+
+_state = _WorkerState()
+
+
+def _end_unless_sending(*_: object) -> None:
+    _state.is_ending = True
+    if _state.is_working:
+        os._exit(1)
 
 
 def run_all(

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from multiprocessing import active_children
 from typing import Any, Protocol
 
-from ..common.parallel import fork_server
+from ..common.parallel import fork_server, prepare_worker, run_call
 from ..common.signals import interrupts_held
 from ..common.validation import require, whole_number
 from ..datasets.dataset import Dataset, Tasks
@@ -130,7 +130,10 @@ class SyntheticSource:
     def _submit(self, part: int, epoch: int, count: int) -> list[Future[Tasks]]:
         numbers = range(epoch * count, (epoch + 1) * count)
         with interrupts_held():  # submitting starts the processes
-            return [self._pool.submit(generate_map_tasks, self._settings, part, n) for n in numbers]
+            return [
+                self._pool.submit(run_call, generate_map_tasks, self._settings, part, n)
+                for n in numbers
+            ]
 
     def description(self) -> dict[str, Any]:
         """Return the settings and the numbers of maps and tasks."""
@@ -178,7 +181,7 @@ def synthetic_source(
     with interrupts_held():
         context = fork_server()
     others = set(active_children())
-    pool = ProcessPoolExecutor(schedule.jobs, context)
+    pool = ProcessPoolExecutor(schedule.jobs, context, prepare_worker)
     try:
         yield SyntheticSource(settings, schedule, pool)
     finally:
