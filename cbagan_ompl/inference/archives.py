@@ -43,7 +43,7 @@ class Archive:
             raise ValueError(f"it has more than {_MAX_MEMBERS} members")
         self._file = zipfile.ZipFile(io.BytesIO(data))
         members = sorted(self._file.infolist(), key=lambda member: member.header_offset)
-        _check_layout(members, data)
+        _check_layout(members, data, self._file.start_dir)
         folders = {member.filename.partition("/")[0] for member in members}
         self._members = {member.filename.partition("/")[2]: member for member in members}
         # Without regard to case, like the reader in torch.
@@ -70,8 +70,14 @@ class Archive:
         return content
 
 
-def _check_layout(members: list[zipfile.ZipInfo], data: bytes) -> None:
-    """Raise if the members, sorted by their places, overlap, expand, or cannot be read."""
+def _check_layout(members: list[zipfile.ZipInfo], data: bytes, end: int) -> None:
+    """Raise if members overlap, expand, or cannot be read.
+
+    Args:
+        members: in the order of their places.
+        data: the content of the file.
+        end: of the last member.
+    """
     if not members or members[0].header_offset != 0 or not data.startswith(_HEADER):
         raise ValueError("its members are not where its directory says")
     for member in members:
@@ -81,7 +87,7 @@ def _check_layout(members: list[zipfile.ZipInfo], data: bytes) -> None:
             raise ValueError(f"a member is compressed by method {member.compress_type}")
         if member.compress_type == zipfile.ZIP_STORED and member.compress_size != member.file_size:
             raise ValueError("a stored member has two sizes")
-    begins = [member.header_offset for member in members[1:]] + [len(data)]
+    begins = [member.header_offset for member in members[1:]] + [end]
     for member, limit in zip(members, begins, strict=True):
         if member.header_offset + _HEADER_BYTES + member.compress_size > limit:
             raise ValueError("members overlap")
