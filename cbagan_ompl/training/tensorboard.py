@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -29,6 +30,7 @@ def open_log(folder: Path, epochs: int) -> SummaryWriter:
     require("torch.utils.tensorboard", "tensorboard")
     from torch.utils.tensorboard import SummaryWriter
 
+    _silence_writers()
     with _translate_failure(folder):
         return SummaryWriter(str(folder), purge_step=epochs + 1)
 
@@ -44,6 +46,20 @@ def write_scalars(log: SummaryWriter, entry: dict[str, Any]) -> None:
             for name, value in entry[group].items():
                 log.add_scalar(f"{group}/{name}", value, entry["epoch"])
         log.flush()
+
+
+def _silence_writers() -> None:
+    """Let no thread that writes a log print its failure, which the next entry raises again."""
+    before = threading.excepthook
+
+    def hook(failure: threading.ExceptHookArgs) -> None:
+        if not (
+            isinstance(failure.exc_value, OSError)
+            and type(failure.thread).__module__.startswith("tensorboard.")
+        ):
+            before(failure)
+
+    threading.excepthook = hook
 
 
 @contextmanager

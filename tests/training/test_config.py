@@ -163,7 +163,27 @@ def test_damaged_files_and_odd_values(tmp_path: Path) -> None:
 
 
 _ODD_YAML = (
-    '!!int ""', "!!timestamp x", "2001-13-01", "&a [*a]", "9" * 5000, "1" + "0" * 400, "[" * 500,
-    "!!python/object/apply:os.system [x]", "!!binary x", '"\\ud800"', "\x00", "{1: {2: 3}}", "<<: x",
-    ".nan", "-.inf", "1e999", "~", "yes", "!!set {a}", "? [a]", "1:2:3", "[1, [2]]", "-1", "0",
-)  # fmt: skip
+    '!!int ""',
+    "!!timestamp x",
+    "2001-13-01",
+    "&a [*a]",
+    "9" * 5000,
+    "1" + "0" * 400,
+    "[" * 500,
+    "!!python/object/apply:os.system [x]",
+    "!!binary x",
+    '"\\ud800"',
+    "\x00",
+    "{1: {2: 3}}",
+    "<<: x",
+    ".nan",
+    "-.inf",
+    "1e999",
+    "~",
+    "yes",
+    "!!set {a}",
+    "? [a]",
+    "1:2:3",
+    "[1, [2]]",
+    "-1",
+)
