@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from reprlib import Repr
 
-# Characters of a message: what lies between its two ends is left out beyond that.
+# Characters of a message: beyond that its middle is left out.
 _LONGEST_MESSAGE, _TAIL = 900, 300
 
-# Integers with more bits are not written out: Python refuses to convert very long ones to text.
+# Integers with more bits are not written out: Python converts no very long ones to text.
 _LONGEST_INTEGER = 128
 
 
@@ -17,6 +17,14 @@ class CbaganOmplError(Exception):
     Args:
         message: what was wrong, with the value, and what to do. Long ones are shortened, and
             characters that a terminal would act on are written as escapes.
+
+    Example:
+        >>> from cbagan_ompl import GridMap
+        >>> try:
+        ...     GridMap.load("bundled:palace")
+        ... except CbaganOmplError as error:
+        ...     print(type(error).__name__, "-", str(error).split(";")[0])
+        MapError - no map 'palace' is bundled
     """
 
     def __init__(self, message: object = "") -> None:
@@ -62,7 +70,10 @@ def show(value: object) -> str:
         >>> show("maze.png"), len(show(list(range(10**6)))) < 100
         ("'maze.png'", True)
     """
-    return _SHORT.repr(value)
+    try:
+        return _SHORT.repr(value)
+    except Exception:  # a class that is called like one of Python's own, such as "int"
+        return f"<{type(value).__name__}>"
 
 
 class _Short(Repr):
@@ -77,6 +88,11 @@ class _Short(Repr):
             return f"<an integer of {x.bit_length()} bits>"
         return repr(x)
 
+    def repr_bytes(self, x: bytes, level: int) -> str:
+        return repr(x) if len(x) <= self.maxother else f"<{len(x)} bytes>"
+
+    repr_bytearray = repr_bytes
+
     def repr_instance(self, x: object, level: int) -> str:
         try:
             return super().repr_instance(x, level)
@@ -88,11 +104,17 @@ _SHORT = _Short()
 
 
 def _plain(message: str) -> str:
-    if len(message) > _LONGEST_MESSAGE:
-        message = f"{message[: _LONGEST_MESSAGE - _TAIL]} [...] {message[-_TAIL:]}"
+    message = _shorten(message)
     if message.isprintable():
         return message
-    return "".join(c if c.isprintable() or c == "\n" else _escape(c) for c in message)
+    # Escapes have up to ten characters each.
+    return _shorten("".join(c if c.isprintable() or c == "\n" else _escape(c) for c in message))
+
+
+def _shorten(text: str) -> str:
+    if len(text) <= _LONGEST_MESSAGE:
+        return text
+    return f"{text[: _LONGEST_MESSAGE - _TAIL]} [...] {text[-_TAIL:]}"
 
 
 def _escape(character: str) -> str:

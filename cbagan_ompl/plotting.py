@@ -22,9 +22,11 @@ from .common.figures import (
     OBSTACLE,
     UNKNOWN,
     check_figure_path,
+    ignore_markup,
     mark_endpoints,
     write_figure,
 )
+from .common.text import one_line
 from .maps.grid_map import GridMap
 
 if TYPE_CHECKING:
@@ -44,6 +46,8 @@ _PADDING, _LEAST_PADDING = 0.03, 3
 _WIDEST, _THINNEST, _WIDTH_OF_ONE = 0.6, 0.12, 20.0
 
 _MOST_TICKS = 8
+
+_LONGEST_NAME = 60  # of a map, characters of the headline
 
 
 def save_figure(
@@ -90,6 +94,7 @@ def make_figure(result: PlanResult, grid: GridMap, *, show_tree: bool = True) ->
     figure.text(0.5, 1 - 0.25 / height, _headline(result), ha="center", va="center", fontsize=11)
     figure.text(0.5, 1 - 0.48 / height, _summary(result), ha="center", va="center", fontsize=9)
     figure.legend(handles=handles, loc="lower center", ncols=4, frameon=False, fontsize=9)
+    ignore_markup(figure)
     return figure
 
 
@@ -188,8 +193,8 @@ def _label_axes(axes: Axes, grid: GridMap) -> None:
         low, high = sorted(limits.tolist())
         values = MaxNLocator(_MOST_TICKS).tick_values(low, high)
         values = values[(values >= low) & (values <= high)]
-        places = grid.to_pixel(np.stack((values, values), axis=-1))[:, number]
-        axis.set_major_locator(FixedLocator(places.tolist()))
+        ticks = grid.to_pixel(np.stack((values, values), axis=-1))[:, number]
+        axis.set_major_locator(FixedLocator(ticks.tolist()))
         axis.set_major_formatter(FixedFormatter([f"{value:g}" for value in values]))
     axes.tick_params(labelsize=8)
     axes.set_xlabel(f"x, {unit}", fontsize=8, labelpad=1)
@@ -204,14 +209,15 @@ def _draw_scale_bar(axes: Axes, grid: GridMap) -> None:
     length = float(10 ** np.floor(np.log10(most)))
     length *= max(factor for factor in (1, 2, 5) if factor * length <= most)
     below = bottom + 0.03 * (bottom - top)
-    ends = (left, left + length / grid.resolution)
-    axes.plot(ends, (below, below), color=BLACK, linewidth=2.5, clip_on=False)
-    axes.text(ends[1] + 0.01 * (right - left), below, f"{length:g} m", fontsize=8, va="center")
+    bar = (left, left + length / grid.resolution)
+    axes.plot(bar, (below, below), color=BLACK, linewidth=2.5, clip_on=False)
+    axes.text(bar[1] + 0.01 * (right - left), below, f"{length:g} m", fontsize=8, va="center")
 
 
 def _headline(result: PlanResult) -> str:
     outcome = f"cost {result.cost:.4g}" if result.solved else "no exact solution"
-    return f"{result.map}: {result.planner}, {result.sampler} sampler, {outcome}"
+    name = one_line(result.map, _LONGEST_NAME)
+    return f"{name}: {result.planner}, {result.sampler} sampler, {outcome}"
 
 
 def _summary(result: PlanResult) -> str:

@@ -9,7 +9,7 @@ the CBAGAN-RRT paper uses, so the command line takes it:
 
     cbagan-ompl train mine --output runs/mine
     cbagan-ompl export runs/mine/best.pt --output mine.pt
-    cbagan-ompl plan office.yaml --start 1.5,2 --goal 14,-3 --model mine.pt
+    cbagan-ompl plan examples/data/office.yaml --start -1.2,6.2 --goal 9,0 --model mine.pt
 
 To let the package label maps for you instead, see `cbagan-ompl dataset generate --help`.
 """

@@ -136,8 +136,8 @@ def unseen_maps_connectivity() -> str:
     regions = dict(read("unseen_maps_ompl_2.0.1.json")["regions"])
     regions["all"] = regions.pop("all")  # last
     rows = {
-        "connected": "connected",
-        "after repair": "connected_after_repair",
+        "connected (8)": "connected",
+        "connected (8), after repair": "connected_after_repair",
         "fraction of free space": "share_of_free_space",
     }
     return table(
@@ -215,7 +215,7 @@ def ablation() -> str:
         [name, f"{scores['iou']:.3f}", f"{scores['dice']:.3f}", connected(scores)]
         for name, scores in tests.items()
     ]
-    return table(["network", "IoU", "Dice", "start connected to goal"], rows)
+    return table(["network", "IoU", "Dice", "connected (8)"], rows)
 
 
 def connected(scores: Json) -> str:
@@ -239,7 +239,7 @@ def regions() -> str:
             rows.append([name, *scores, "", "", ""])
         else:
             rows.append([name, *region_cells(predictions[key])])
-    header = ["", "IoU", "Dice", "start connected to goal", "parameters", "inference"]
+    header = ["", "IoU", "Dice", "connected (8)", "parameters", "inference"]
     return table(header, rows)
 
 

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import ast
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+import cbagan_ompl
 from cbagan_ompl import reached_planners
+from cbagan_ompl.cli import main
 from cbagan_ompl.planning.compat import HAS_STATE_SAMPLER_ALLOCATOR
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
@@ -64,6 +68,80 @@ def test_getting_started_runs(tmp_path: Path) -> None:
     assert "True" in run("\n".join(blocks), tmp_path)
 
 
+# What makes a documented benchmark quick, as options that come after its own.
+QUICK = "--planners RRT --samplers uniform,corridor --runs 1 --time 0.05 --tasks-per-map 1 --jobs 1"
+
+
+@pytest.mark.slow
+def test_commands_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("torch")
+    page = (DOCS / "command-line.md").read_text(encoding="utf-8")
+    block = page.split("```sh\n")[1].split("```")[0]
+    commands = [line for line in block.splitlines() if not line.startswith("#")]
+    assert len(commands) >= 5
+    for folder in ("examples", "benchmarks"):
+        (tmp_path / folder).symlink_to(DOCS.parent / folder)
+    monkeypatch.chdir(tmp_path)
+    for command in commands:
+        program, *words = shlex.split(command)
+        assert program == "cbagan-ompl"
+        quick = shlex.split(QUICK) if words[0] == "benchmark" else []
+        # No path in time is the fault of a busy machine, not of the page.
+        assert main([*words, *quick]) in ((0, 1) if words[0] == "plan" else (0,)), command
+
+
+def test_every_documented_plan_on_the_office_is_one_task() -> None:
+    """That of the examples: what is copied from any page then runs."""
+    pages = [DOCS.parent / "README.md", *DOCS.rglob("*.md"), *(DOCS.parent / "examples").glob("*")]
+    found = [
+        line
+        for page in pages
+        if page.suffix in (".md", ".py")
+        for line in page.read_text(encoding="utf-8").splitlines()
+        if "cbagan-ompl plan" in line and "office" in line
+    ]
+    assert len(found) >= 4
+    for line in found:
+        assert "plan examples/data/office.yaml --start -1.2,6.2 --goal 9,0" in line
+
+
+def test_quoted_messages_are_those_of_the_package() -> None:
+    templates = message_templates()
+    page = (DOCS / "troubleshooting.md").read_text(encoding="utf-8")
+    quotes = re.findall(r"^`([^`]+ [^`]+)`$", page, re.MULTILINE)
+    ours = [quote for quote in quotes if not quote.startswith("nanobind:")]
+    assert len(ours) >= 5
+    for quote in ours:
+        name, colon, text = quote.partition(": ")
+        if colon and name.isidentifier():
+            assert hasattr(cbagan_ompl, name)
+            quote = text
+        quote = quote.removesuffix(" ...")
+        assert any(begins(template, quote) for template in templates), quote
+
+
+def message_templates() -> list[list[str | None]]:
+    """Return the texts of the package in parts; None stands for a value."""
+    found: list[list[str | None]] = []
+    for path in (DOCS.parent / "cbagan_ompl").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.JoinedStr):
+                parts = (getattr(part, "value", None) for part in node.values)
+                found.append([part if isinstance(part, str) else None for part in parts])
+    return found
+
+
+def begins(template: list[str | None], text: str) -> bool:
+    """Return whether a message begins with a text; a value stands for a word or less."""
+    if not text or not template:
+        return not text
+    part, *rest = template
+    if part is None:
+        return any(begins(rest, text[k:]) for k in range(1, len(text.split(" ")[0]) + 1))
+    length = min(len(part), len(text))
+    return part[:length] == text[:length] and begins(rest, text[length:])
+
+
 def test_table_of_hooks() -> None:
     column = 2 if HAS_STATE_SAMPLER_ALLOCATOR else 1
     page = (DOCS / "planners.md").read_text(encoding="utf-8")
@@ -83,9 +161,9 @@ def test_every_included_table_is_there() -> None:
             assert (page.parent / name).is_file(), name
 
 
-def test_picture_of_the_layers_has_every_package() -> None:
-    picture = (DOCS / "images" / "layers.svg").read_text(encoding="utf-8")
-    names = re.findall(r"font-weight='bold'[^>]*>(\w+)<", picture)
+def test_figure_of_the_layers_has_every_package() -> None:
+    figure = (DOCS / "images" / "layers.svg").read_text(encoding="utf-8")
+    names = re.findall(r"font-weight='bold'[^>]*>(\w+)<", figure)
     package = DOCS.parent / "cbagan_ompl"
     modules = {p.stem for p in package.iterdir() if p.is_dir() or p.suffix == ".py"}
     assert set(names) == {name for name in modules if not name.startswith("_")}

@@ -1,4 +1,4 @@
-"""The plan of the package: which room may import which, and what each may load."""
+"""The layers of the package: which may import which, and what each may load."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 
 PACKAGE = Path(__file__).resolve().parents[1] / "cbagan_ompl"
 
-#: Each room with the rooms and modules below it, which are all that it may import.
+#: Each layer with the packages and modules below it, which are all that it may import.
 BELOW = {
     "errors": set[str](),
     "networks": {"errors"},
@@ -35,7 +35,7 @@ BELOW["cli"] = BELOW["training"] | {"training", "benchmarking", "plotting"}
 MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path != PACKAGE / "__init__.py")
 
 
-def room_of(path: Path) -> str:
+def layer_of(path: Path) -> str:
     return path.relative_to(PACKAGE).with_suffix("").parts[0]
 
 
@@ -68,24 +68,26 @@ def names(path: Path) -> set[str]:
     return found
 
 
-def test_the_root_holds_rooms_only() -> None:
-    rooms = {path.name for path in PACKAGE.iterdir() if (path / "__init__.py").is_file()}
+def test_the_root_holds_layers_only() -> None:
+    packages = {path.name for path in PACKAGE.iterdir() if (path / "__init__.py").is_file()}
     modules = {path.stem for path in PACKAGE.glob("*.py")} - {"__init__"}
-    assert rooms | modules == set(BELOW), "a new room needs a place in BELOW, see docs/design.md"
+    assert packages | modules == set(BELOW), (
+        "a new layer needs an entry in BELOW, see docs/design.md"
+    )
     assert modules == {"errors", "plotting"}
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_imports_run_down(path: Path) -> None:
-    room = room_of(path)
+    layer = layer_of(path)
     for target in imports(path):
         # The root holds the version and the public names.
         above = target[0] if target else PACKAGE.name
-        allowed = BELOW[room] | {room, "__version__"}
+        allowed = BELOW[layer] | {layer, "__version__"}
         assert above in allowed, f"{path.relative_to(PACKAGE)} imports {'.'.join(target)}"
 
 
-def test_no_two_modules_of_a_room_import_each_other() -> None:
+def test_no_two_modules_of_a_layer_import_each_other() -> None:
     """Only imports at the top of a module count: those inside functions close no circle."""
     graph: dict[str, set[str]] = {}
     known = {".".join(p.relative_to(PACKAGE).with_suffix("").parts): p for p in MODULES}
@@ -113,10 +115,10 @@ def test_no_two_modules_of_a_room_import_each_other() -> None:
 
 def test_who_may_import_ompl_torch_and_matplotlib() -> None:
     for path in MODULES:
-        room, packages = room_of(path), names(path)
-        assert "ompl" not in packages or room == "planning", path
+        layer, packages = layer_of(path), names(path)
+        assert "ompl" not in packages or layer == "planning", path
         if "torch" in packages:
-            assert room in {"networks", "training", "inference", "evaluation", "cli"}, path
+            assert layer in {"networks", "training", "inference", "evaluation", "cli"}, path
         if "matplotlib" in packages:
             figures = {"figures", "plotting", "plots", "plot_styles", "sample_grid"}
             assert path.stem in figures, path

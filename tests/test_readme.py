@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -12,8 +13,10 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from helpers.scripts import run_script
 
 from cbagan_ompl import GridMap, bundled_maps, reached_planners
+from cbagan_ompl.cli import main
 from cbagan_ompl.planning.compat import BOOST_PYTHON
 
 ROOT = Path(__file__).parents[1]
@@ -57,6 +60,18 @@ def test_drop_in_example(tmp_path: Path, planner: str) -> None:
     assert hook == reached_planners()[planner]
     learned, uniform = (int(n) for n in re.findall(r"\d+", counts))
     assert learned > 5 * uniform > 0
+
+
+@pytest.mark.slow
+def test_own_map_example(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    monkeypatch.chdir(tmp_path)
+    program, *words = shlex.split(block("own-map-command"))
+    assert program == "cbagan-ompl"
+    assert main(words) == 0
+    assert (tmp_path / "office.png").is_file()
+    (tmp_path / "script.py").write_text(block("own-map"))
+    assert run_script(Path("script.py")).startswith("True ")
 
 
 def test_table_of_results_is_that_of_the_result_file() -> None:

@@ -22,7 +22,6 @@ from functools import partial
 from time import perf_counter
 from typing import Any
 
-import cv2
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -31,10 +30,12 @@ from tqdm import tqdm
 from cbagan_ompl import GridMap, Heatmap, PlanResult, Predictor, load_model, plan
 from cbagan_ompl.benchmarking.tasks import BenchmarkTask, select_tasks
 from cbagan_ompl.common.files import write_json
+from cbagan_ompl.maps.connectivity import in_one_component, label_components
 from cbagan_ompl.networks.config import NetworkConfig
 from cbagan_ompl.networks.export_model import RegionModel
 from cbagan_ompl.networks.factory import make_generator
 from cbagan_ompl.planning.compat import ompl_version
+from cbagan_ompl.sampling.heatmap import pixel_pair
 
 RANGE, TIME = 20.0, 2.0
 Endpoints = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -88,9 +89,8 @@ def predict_regions(
 
 def connects(heatmap: Heatmap, start: NDArray[np.float64], goal: NDArray[np.float64]) -> bool:
     """Return whether the region contains start and goal and an 8-connected path between them."""
-    parts = cv2.connectedComponents(heatmap.region.astype(np.uint8), connectivity=8)[1]
-    (u, v), (x, y) = heatmap.grid.to_pixel((start, goal)).astype(int).tolist()
-    return bool(parts[v, u] == parts[y, x] > 0)
+    labels = label_components(heatmap.region, connectivity=8)
+    return in_one_component(labels, *pixel_pair(heatmap.grid.to_pixel((start, goal))))
 
 
 def timed(times: list[float], work: Callable[..., Any], *arguments: Any, **options: Any) -> Any:

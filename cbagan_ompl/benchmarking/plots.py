@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ..common.figures import write_figure
+from ..common.text import one_line
 from .logs import GEOMETRIC, ExperimentLog, number
 from .measures import BEST_KNOWN, INFERENCE, NODES, logged_costs
 from .plot_styles import Panels, Style, legend_handles, styles_of
@@ -23,6 +24,9 @@ _DOTS_PER_INCH = 200
 _HEIGHT = 2.7  # of a panel, inches
 _RATIO_HEIGHT, _RATIO_ROW_HEIGHT = 0.9, 0.32
 _TIMES = 400  # points of a curve of costs
+
+# Kinds of map, of which a benchmark may have as many as maps, and characters of their names.
+_MOST_FAMILIES, _LONGEST_LABEL = 60, 40
 
 # Costs are drawn on a logarithmic axis, those nearer to the best known one at its lower end.
 _LEAST_EXCESS = 0.1
@@ -188,14 +192,14 @@ def _costs_at(run: _Run, times: NDArray[np.float64]) -> NDArray[np.float64]:
 def _boxes_figure(runs: _Runs, value: Callable[[_Run], float], label: str) -> Figure:
     """Draw for each planner a box for each sampler: quartiles, and whiskers at 5 and 95 %."""
     panels, styles = Panels(list(runs), _HEIGHT), _styles(runs)
-    places = {sampler: place for place, sampler in enumerate(styles)}
-    slanted = len(places) > 3
+    ticks = {sampler: tick for tick, sampler in enumerate(styles)}
+    slanted = len(ticks) > 3
     for axes, by_sampler in zip(panels.axes, runs.values(), strict=True):
         for sampler, of_sampler in by_sampler.items():
-            _draw_box(axes, [value(run) for run in of_sampler], places[sampler], styles[sampler])
+            _draw_box(axes, [value(run) for run in of_sampler], ticks[sampler], styles[sampler])
         axes.set_xticks(
-            list(places.values()),
-            list(places),
+            list(ticks.values()),
+            list(ticks),
             rotation=25 if slanted else 0,
             ha="right" if slanted else "center",
             rotation_mode="anchor",
@@ -206,11 +210,11 @@ def _boxes_figure(runs: _Runs, value: Callable[[_Run], float], label: str) -> Fi
     return panels.figure
 
 
-def _draw_box(axes: Axes, values: Sequence[float], place: float, style: Style) -> None:
+def _draw_box(axes: Axes, values: Sequence[float], position: float, style: Style) -> None:
     line = {"color": style.color, "linewidth": 1.2}
     axes.boxplot(
         [values],
-        positions=[place],
+        positions=[position],
         widths=0.6,
         patch_artist=True,
         whis=(5, 95),
@@ -222,7 +226,7 @@ def _draw_box(axes: Axes, values: Sequence[float], place: float, style: Style) -
         capprops=line,
     )
     axes.plot(
-        place,
+        position,
         np.median(values),
         marker=style.marker,
         markersize=8,
@@ -237,7 +241,8 @@ def _ratio_figure(results: Results, measure: str, label: str) -> Figure | None:
     Returns:
         None where no planner with another sampler gets there.
     """
-    groups = {"all maps": results.overall} | dict(sorted(results.families.items()))
+    families = sorted(results.families.items())[:_MOST_FAMILIES]
+    groups = {"all maps": results.overall} | dict(families)
     shown = [
         summary.planner
         for summary in results.overall
@@ -258,13 +263,17 @@ def _ratio_figure(results: Results, measure: str, label: str) -> Figure | None:
                 if summary.planner == planner and summary.ratios:
                     hollow = _both_at_limit(summary, summaries, measure)
                     any_hollow = any_hollow or hollow
-                    place = row + offsets[summary.sampler]
-                    _draw_ratio(axes, summary, measure, place, styles[summary.sampler], hollow)
+                    position = row + offsets[summary.sampler]
+                    _draw_ratio(axes, summary, measure, position, styles[summary.sampler], hollow)
     panels.use_logarithm("x")
-    panels.axes[0].set_yticks(range(len(groups)), list(groups))
+    labels = [one_line(name, _LONGEST_LABEL) for name in groups]
+    panels.axes[0].set_yticks(range(len(groups)), labels)
     panels.axes[0].set_ylim(len(groups) - 0.5, -0.5)
     panels.label(x=f"ratio to {BASELINE}, below 1 is better")
     note = " (hollow: most runs of both end at the limit)" if any_hollow else ""
+    left_out = len(results.families) - len(families)
+    if left_out:
+        note += f" ({left_out} kinds of map left out)"
     panels.figure.suptitle(f"{label}, with inference{note}", fontsize=10)
     panels.add_legend(legend_handles(styles, dashed=False))
     return panels.figure
@@ -277,13 +286,13 @@ def _both_at_limit(summary: Summary, summaries: Sequence[Summary], measure: str)
 
 
 def _draw_ratio(
-    axes: Axes, summary: Summary, measure: str, place: float, style: Style, hollow: bool
+    axes: Axes, summary: Summary, measure: str, position: float, style: Style, hollow: bool
 ) -> None:
     ratio = summary.ratios[measure]
-    axes.plot([ratio.low, ratio.high], [place, place], color=style.color, linewidth=1.4)
+    axes.plot([ratio.low, ratio.high], [position, position], color=style.color, linewidth=1.4)
     axes.plot(
         ratio.median,
-        place,
+        position,
         color=style.color,
         marker=style.marker,
         markersize=5,

@@ -83,7 +83,7 @@ def markdown(results: Results, conditions: Conditions) -> str:
             _ratios_table(results.overall, settings.within),
             _RATIO_NOTES,
             "## Ratios by kind of map",
-            _families_table(results.families, settings.within),
+            _kinds_table(results.families, settings.within),
         ]
     if conditions.failures:
         failed = conditions.failures.items()
@@ -124,15 +124,15 @@ def _ratios_table(summaries: Sequence[Summary], within: int) -> str:
     return table(["planner", "sampler", *shown.values()], rows)
 
 
-def _families_table(families: Mapping[str, Sequence[Summary]], within: int) -> str:
+def _kinds_table(by_kind: Mapping[str, Sequence[Summary]], within: int) -> str:
     shown = {
         "first_solution_total_s": "first solution with inference",
         within_key(within, total=True): f"to {within} % of best with inference",
         "final_cost": "final cost",
     }
     rows = [
-        [family, *_ratio_row(summary, shown)]
-        for family, summaries in families.items()
+        [kind, *_ratio_row(summary, shown)]
+        for kind, summaries in by_kind.items()
         for summary in summaries
         if summary.ratios
     ]
@@ -155,8 +155,8 @@ def _format_measure(summary: Summary, name: str) -> str:
 
 
 def _format_range(interval: Interval, scale: float = 1) -> str:
-    ends = (f"{end * scale:.4g}" if isfinite(end) else "∞" for end in (interval.low, interval.high))
-    return " to ".join(ends)
+    bounds = (interval.low, interval.high)
+    return " to ".join(f"{b * scale:.4g}" if isfinite(b) else "∞" for b in bounds)
 
 
 def _format_ratio(interval: Interval) -> str:

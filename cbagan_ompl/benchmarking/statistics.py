@@ -77,7 +77,7 @@ class Results:
 
     Attributes:
         overall: over all tasks, one for each planner with each sampler.
-        families: the same for each kind of map; a map of no kind is a kind of its own.
+        families: the same for each kind of map; a map without a kind forms a group by itself.
     """
 
     overall: list[Summary]
@@ -110,7 +110,11 @@ def _total_time(name: str) -> _Reader:
 def _relative_cost(name: str) -> _Reader:
     def read(run: Mapping[str, str], log: ExperimentLog) -> _Value:
         cost = number(run[name])
-        return (inf, True) if cost is None else (cost / float(log.parameters[BEST_KNOWN]), False)
+        if cost is None:
+            return inf, True
+        best = float(log.parameters[BEST_KNOWN])
+        # A path without length is the best one where the start lies in the goal region.
+        return (1.0 if cost == best else cost / best if best else inf), False
 
     return read
 
@@ -170,11 +174,11 @@ _TaskRuns = tuple[ExperimentLog, list[Mapping[str, str]]]
 def results_of(logs: Sequence[ExperimentLog], percents: Iterable[int] = WITHIN_PERCENT) -> Results:
     """Return summaries over all tasks and by kind of map; arguments as for :func:`summarize`."""
     measures = measures_of(percents)
-    families: dict[str, list[ExperimentLog]] = {}
+    by_kind: dict[str, list[ExperimentLog]] = {}
     for log in logs:
-        families.setdefault(log.parameters[FAMILY], []).append(log)
-    by_family = {name: summarize(some, measures) for name, some in families.items()}
-    return Results(summarize(logs, measures), by_family)
+        by_kind.setdefault(log.parameters[FAMILY], []).append(log)
+    summaries = {kind: summarize(some, measures) for kind, some in by_kind.items()}
+    return Results(summarize(logs, measures), summaries)
 
 
 def summarize(
@@ -270,7 +274,12 @@ def ratio_interval(
 
 
 def ratio(values: NDArray[np.float64], baseline: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return quotients; two equal values have the ratio 1, also where both are infinite."""
+    """Return quotients; two equal values have the ratio 1, also where both are infinite.
+
+    Args:
+        values: the dividends, of any shape, in any unit.
+        baseline: the divisors, of the same shape and unit.
+    """
     ones: NDArray[np.float64] = np.ones(values.shape)
     with np.errstate(divide="ignore"):
         return np.divide(values, baseline, out=ones, where=values != baseline)

@@ -10,11 +10,21 @@ from pathlib import Path
 from typing import Any
 
 from ..benchmarking.settings import Settings, parse_parameters
-from ..common.validation import check_at_least
-from ..errors import ConfigError
+from ..common.text import one_line
+from ..common.validation import whole_number
+from ..errors import ConfigError, show
 from ..maps.loading import bundled_maps
 from ..planning.heatmap_sources import LEARNED
-from .options import add_map_options, add_sampler_options, map_options, sampler_options
+from .options import (
+    add_map_options,
+    add_sampler_options,
+    describe_samplers,
+    map_options,
+    sampler_options,
+)
+
+# Tasks that run at a time, and characters that a report shows of the command.
+_MOST_JOBS, _LONGEST_COMMAND = 1024, 20_000
 
 _HELP = """\
 Compare samplers in OMPL's own planners, with OMPL's Benchmark, on the same tasks.
@@ -30,7 +40,9 @@ At the end the output folder holds:
   summary.md        the same as a report
   *.png, *.pdf      plots
 
-Exit status: 0 done, 1 some tasks failed, 2 bad input, 130 interrupted (continue with --resume).
+Exit status: 0 done, 1 some tasks failed, 2 bad input or a file that cannot be written, 70 an error
+of cbagan-ompl itself (--debug prints its traceback), 130 interrupted, 143 terminated (continue
+with --resume).
 """
 
 
@@ -42,8 +54,8 @@ def add_benchmark_parser(commands: Any) -> None:
         help="compare samplers on many tasks",
         description=_HELP.format(maps=", ".join(bundled_maps())),
         formatter_class=argparse.RawDescriptionHelpFormatter,
-        fromfile_prefix_chars="@",
     )
+    parser.reads_files = True
     parser.set_defaults(run=_benchmark)
     parser.add_argument("maps", nargs="*", metavar="MAP", help="map file, or bundled:NAME")
 
@@ -52,7 +64,8 @@ def add_benchmark_parser(commands: Any) -> None:
         "--tasks",
         metavar="FILE",
         help="tasks for the maps: .csv (map,start_x,start_y,goal_x,goal_y[,optimal_cost,"
-        "family]) or MovingAI .scen (default: those that come with a map, otherwise random ones)",
+        "family], where family is the kind of map) or MovingAI .scen (default: those that come "
+        "with a map, otherwise random ones)",
     )
     tasks.add_argument(
         "--tasks-per-map",
@@ -78,8 +91,7 @@ def add_benchmark_parser(commands: Any) -> None:
         type=_names,
         default=defaults.samplers,
         metavar="A,B",
-        help="uniform (OMPL's own), learned, corridor (around a grid search's path), straight-line "
-        f"(default: {','.join(defaults.samplers)})",
+        help=f"{describe_samplers()} (default: {','.join(defaults.samplers)})",
     )
     comparison.add_argument(
         "--heatmap-dir",
@@ -168,14 +180,14 @@ def _names(text: str) -> tuple[str, ...]:
 
 def _named_folder(text: str) -> tuple[str, str]:
     name, _, folder = text.partition("=")
-    if not name or not Path(folder).is_dir() or not folder:
-        raise argparse.ArgumentTypeError(f"expected NAME=DIR with a folder DIR, got {text!r}")
+    if not (name and folder and os.path.isdir(folder)):
+        raise argparse.ArgumentTypeError(f"expected NAME=DIR with a folder DIR, got {show(text)}")
     return name, folder
 
 
 def _model(text: str) -> tuple[str, str]:
     name, equals, file = text.partition("=")
-    return (name, file) if equals and not Path(text).exists() else (LEARNED, text)
+    return (name, file) if equals and not os.path.exists(text) else (LEARNED, text)
 
 
 def _cores() -> int:
@@ -208,7 +220,7 @@ def _benchmark(args: argparse.Namespace) -> int:
     from ..benchmarking.benchmark import Benchmark, write_results
     from ..benchmarking.tasks import select_tasks
 
-    check_at_least("jobs", args.jobs, 1)
+    whole_number("jobs", args.jobs, 1, _MOST_JOBS)
     if args.jobs > _cores():
         print(
             f"warning: {args.jobs} jobs share {_cores()} cores, all times will be too long",
@@ -220,8 +232,8 @@ def _benchmark(args: argparse.Namespace) -> int:
     )
     benchmark = Benchmark(tasks, settings, Path(args.output), args.resume)
     failures = benchmark.run(args.jobs)
-    logs = benchmark.finished_logs()
+    logs = benchmark.finished_logs(failures)
     if logs:
-        command = shlex.join(["cbagan-ompl", *sys.argv[1:]])
+        command = one_line(shlex.join(["cbagan-ompl", *sys.argv[1:]]), _LONGEST_COMMAND)
         print(write_results(logs, settings, failures, benchmark.folder, command))
     return 1 if failures else 0

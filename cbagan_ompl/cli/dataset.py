@@ -186,11 +186,11 @@ def _import(args: argparse.Namespace) -> int:
     print(
         f"{values['name']}: {values['train_tasks']} tasks for training, {values['test_tasks']} for "
         f"testing, on {values['maps']} maps of {values['side']} x {values['side']} pixels\n"
-        f"  maps with tasks in both lists:       {values['shared_maps']}\n"
-        f"  test tasks that are in training too: {values['repeated_tasks']}\n"
-        f"  labels that connect start and goal:  {values['joined']:.2%}\n"
-        f"  fraction of free space in regions:   {values['region_share']:.1%}\n"
-        f"  tasks with a blocked start or goal:  {values['blocked_ends']}"
+        f"  maps with tasks in both lists:           {values['shared_maps']}\n"
+        f"  test tasks that are in training too:     {values['repeated_tasks']}\n"
+        f"  labels that connect start and goal (8):  {values['joined']:.2%}\n"
+        f"  fraction of free space in regions:       {values['region_share']:.1%}\n"
+        f"  tasks with a blocked start or goal:      {values['blocked_ends']}"
     )
     if args.output is not None:
         print(f"copied to {args.output}, split: {args.split}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from ..planning.heatmap_sources import SAMPLERS
 from ..sampling.options import (
     ADAPTATION_RULES,
     DEFAULT_UNIFORM_FRACTION,
@@ -77,3 +78,8 @@ def sampler_options(args: argparse.Namespace) -> SamplerOptions:
         adaptation=Adaptation.of(args.adaptation),
         seed=args.seed,
     )
+
+
+def describe_samplers() -> str:
+    """Return the names of the samplers with what each samples, for the help of an option."""
+    return "; ".join(f"{name}: {what}" for name, what in SAMPLERS.items())

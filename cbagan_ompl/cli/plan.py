@@ -11,7 +11,13 @@ from ..maps.grid_map import GridMap
 from ..maps.loading import bundled_maps
 from ..maps.tasks import tasks_of
 from ..sampling.heatmap import Heatmap
-from .options import add_map_options, add_sampler_options, map_options, sampler_options
+from .options import (
+    add_map_options,
+    add_sampler_options,
+    describe_samplers,
+    map_options,
+    sampler_options,
+)
 
 _PLAN_HELP = """\
 Plan a path on a map with one of OMPL's planners.
@@ -20,7 +26,10 @@ The map is a PNG, JPG, BMP or PGM image (dark pixels are obstacles), a ROS map_s
 MovingAI .map, or one of the bundled maps: {maps}.
 
 Coordinates are pixels, x right and y down from the upper left corner, or metres in the frame of
-a ROS map. Exit status: 0 solved, 1 no exact solution in time, 2 bad input.
+a ROS map.
+
+Exit status: 0 solved, 1 no exact solution in time, 2 bad input or a file that cannot be written,
+70 an error of cbagan-ompl itself (--debug prints its traceback), 130 interrupted, 143 terminated.
 """
 
 
@@ -71,12 +80,13 @@ def add_plan_parser(commands: Any) -> None:
         "--sampler",
         default="learned",
         metavar="NAME",
-        help="learned, uniform (OMPL's own), corridor (around a grid search's path) or "
-        "straight-line (default: learned)",
+        help=f"{describe_samplers()} (default: learned)",
     )
     sampler.add_argument("--model", metavar="FILE", help="exported model (default: the bundled)")
     sampler.add_argument(
-        "--heatmap", metavar="FILE", help="draw from this image or .npy instead of a model's"
+        "--heatmap",
+        metavar="FILE",
+        help="sample from this image or .npy instead of a model's heat map",
     )
     add_sampler_options(sampler)
 

@@ -223,7 +223,7 @@ def _print_scores(result: dict[str, Any]) -> None:
     for name, scores in rows.items():
         print(
             f"  {name:15} IoU {scores['iou']:.3f}  Dice {scores['dice']:.3f}  "
-            f"connectivity {scores['connectivity']:.1%}"
+            f"connected (8) {scores['connectivity']:.1%}"
         )
     print(f"export it with: cbagan-ompl export {result['checkpoint']} --output MODEL.pt")
 

@@ -1,1 +1,1 @@
-"""What every room may use: checks, files, processes, tables. No maps, no networks, no ompl."""
+"""Used by every other package: checks, files, processes, tables. No maps, networks or ompl."""

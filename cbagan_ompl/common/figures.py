@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+from io import BytesIO
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -10,9 +12,10 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.text import Text
 
 from ..errors import ConfigError
-from .files import reason
+from .files import write_atomically
 from .outputs import MADE_BY
 
 # Okabe and Ito's palette, which colour-blind readers can tell apart
@@ -23,7 +26,7 @@ BLUE, VERMILLION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
 #: Obstacles, and space of which nothing is known.
 OBSTACLE, UNKNOWN = "#4d4d4d", "#c3cfdb"
 
-#: Marker, colour and size of the two ends of a task, the same in every figure.
+#: Marker, colour and size of the two endpoints of a task, the same in every figure.
 START_MARK, GOAL_MARK = ("o", GREEN, 10.0), ("*", VERMILLION, 15.0)
 
 
@@ -64,7 +67,7 @@ def check_figure_path(path: str | PathLike[str]) -> None:
     Raises:
         ConfigError: the suffix stands for no format that can be written.
     """
-    formats = FigureCanvasAgg.get_supported_filetypes()
+    formats = set(FigureCanvasAgg.get_supported_filetypes()) - {"pgf"}  # which needs TeX
     if Path(path).suffix.lstrip(".").lower() not in formats:
         raise ConfigError(
             f"cannot save a figure as {Path(path).name!r}; its suffix must be one of "
@@ -73,15 +76,31 @@ def check_figure_path(path: str | PathLike[str]) -> None:
 
 
 def write_figure(figure: Figure, path: str | PathLike[str], dots_per_inch: int = 150) -> None:
-    """Save a figure; its suffix chooses the format.
+    """Save a figure, whole or not at all; the suffix chooses the format.
+
+    Args:
+        figure: the figure.
+        path: of the file; its suffix is one that :func:`check_figure_path` lets pass.
+        dots_per_inch: of images.
 
     Raises:
         ConfigError: the file cannot be written.
     """
-    try:
-        figure.savefig(path, dpi=dots_per_inch, **_signature_of(path))
-    except OSError as error:
-        raise ConfigError(f"cannot write the figure {path}: {reason(error)}") from error
+    ignore_markup(figure)
+    buffer = BytesIO()
+    kind = Path(path).suffix.lstrip(".").lower()
+    with warnings.catch_warnings():
+        # Scripts that the font does not have are drawn as boxes; crowded panels stay crowded.
+        warnings.filterwarnings("ignore", "Glyph .* missing", UserWarning)
+        warnings.filterwarnings("ignore", "constrained_layout not applied", UserWarning)
+        figure.savefig(buffer, format=kind, dpi=dots_per_inch, **_signature_of(path))
+    write_atomically(path, buffer.getvalue())
+
+
+def ignore_markup(figure: Figure) -> None:
+    """Draw all texts of a figure as they are: ``$`` in a name is no formula."""
+    for text in figure.findobj(Text):
+        text.set_parse_math(False)
 
 
 def _signature_of(path: str | PathLike[str]) -> dict[str, Any]:

@@ -139,27 +139,34 @@ def write_atomically(
     data: bytes | str,
     error_class: type[CbaganOmplError] = ConfigError,
 ) -> None:
-    """Write a file whole or not at all: no reader, and no interruption, meets half of it.
+    """Write a file whole or not at all, whoever reads it or interrupts this.
 
     Args:
-        path: of the file; its folder must exist.
+        path: of the file; its folder must exist. Where it is a link, what it points to is written.
         data: its content, text as UTF-8.
         error_class: what to raise.
 
     Raises:
-        CbaganOmplError: of that class; the file cannot be written.
+        CbaganOmplError: of that class; the file cannot be written, or is a folder, device or pipe.
     """
-    target = Path(path)
-    temporary = target.with_name(f"{target.name}.tmp")
+    encoded = data.encode("utf-8") if isinstance(data, str) else data
     try:
+        target = Path(os.path.realpath(path))
+        if target.exists() and not target.is_file():
+            # A device would be replaced by a file, for all who use it.
+            kind = "a folder" if target.is_dir() else "a device or a pipe"
+            raise error_class(f"cannot write {path}: it is {kind}, not a file")
+        # A name that is short, and nobody else's.
+        temporary = target.with_name(f".{os.urandom(8).hex()}.tmp")
         try:
-            temporary.write_bytes(data.encode("utf-8") if isinstance(data, str) else data)
+            with temporary.open("xb") as file:
+                file.write(encoded)
             os.replace(temporary, target)
         except BaseException:
             temporary.unlink(missing_ok=True)
             raise
     except (OSError, ValueError) as error:
-        raise error_class(f"cannot write {target}: {reason(error)}") from error
+        raise error_class(f"cannot write {path}: {reason(error)}") from error
 
 
 def write_json(path: str | os.PathLike[str], values: Mapping[str, Any]) -> None:

@@ -15,4 +15,8 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
         | maze | 12 |
     """
     lines = [header, ["---"] * len(header), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    return "\n".join(f"| {' | '.join(map(_escape, line))} |" for line in lines)
+
+
+def _escape(cell: str) -> str:
+    return cell.replace("|", r"\|")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,14 @@ from .files import check_folder, open_regular, write_json
 
 #: What every file of ours says of itself, near its begin or its end.
 MADE_BY = f"cbagan-ompl {__version__}"
-_SIGNATURE = b"cbagan-ompl"
+# As it is written in JSON, PNG, PDF, SVG, PostScript, JPEG and Markdown files: the name alone would
+# also be found in a text about this package.
+_SIGNATURE = re.compile(
+    rb'\A\{\s*"made_by": "cbagan-ompl |Software\0cbagan-ompl |/Creator \(cbagan-ompl '
+    rb"|<dc:title>cbagan-ompl |%%Creator: cbagan-ompl |\xff\xfe\0.cbagan-ompl "
+    rb"|Made by cbagan-ompl ",
+    re.DOTALL,
+)
 _SEARCHED = 2**16
 
 
@@ -31,7 +39,7 @@ def check_output(
         ConfigError: the folder does not exist, the file is an input, or it is not ours.
     """
     check_folder(path)
-    if path is None or not os.path.lexists(path):
+    if path is None or not os.path.exists(path):
         return
     for given in inputs:
         if os.path.exists(given) and os.path.samefile(given, path):
@@ -54,7 +62,7 @@ def write_report(path: str, values: Mapping[str, Any]) -> None:
 
 def _is_ours(path: Path) -> bool:
     with open_regular(path, ConfigError) as file:
-        if _SIGNATURE in file.read(_SEARCHED):
+        if _SIGNATURE.search(file.read(_SEARCHED)):
             return True
         file.seek(max(0, os.fstat(file.fileno()).st_size - _SEARCHED))
-        return _SIGNATURE in file.read(_SEARCHED)
+        return _SIGNATURE.search(file.read(_SEARCHED)) is not None

@@ -8,7 +8,10 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import active_children, forkserver, get_context, resource_tracker
+from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerContext
+from multiprocessing.process import BaseProcess
+from threading import Thread
 from typing import Any, TypeVar
 
 from tqdm import tqdm
@@ -17,6 +20,9 @@ from ..errors import DatasetError
 from .signals import interrupts_held
 
 T = TypeVar("T")
+
+# Seconds between two looks for an interrupt, and that a process has to start after one.
+_POLL_S, _PATIENCE_S = 0.05, 0.3
 
 
 def fork_server(preload: Sequence[str] = ()) -> ForkServerContext:
@@ -75,6 +81,41 @@ def _end_unless_sending(*_: object) -> None:
         os._exit(1)
 
 
+def start_first(process: BaseProcess, interrupted: Connection) -> None:
+    """Start the first process of a server, without waiting for the server after an interrupt.
+
+    It answers once it has imported everything, which takes seconds for torch.
+
+    Args:
+        process: of :func:`fork_server`; no other one of this server is running.
+        interrupted: from :func:`.signals.interrupts_held`.
+
+    Raises:
+        KeyboardInterrupt: an interrupt came first; the server is ended.
+    """
+    errors: list[BaseException] = []
+
+    def start() -> None:
+        try:
+            process.start()
+        except BaseException as error:
+            errors.append(error)
+
+    thread = Thread(target=start, daemon=True)
+    thread.start()
+    while thread.is_alive() and not interrupted.poll():
+        thread.join(_POLL_S)
+    thread.join(_PATIENCE_S)
+    if thread.is_alive():
+        server = getattr(forkserver.ensure_running, "__self__", None)
+        pid = getattr(server, "_forkserver_pid", None)
+        if pid:
+            os.kill(pid, signal.SIGKILL)
+        raise KeyboardInterrupt
+    if errors:
+        raise errors[0]
+
+
 def run_all(
     work: Callable[..., T],
     arguments: Sequence[tuple[Any, ...]],
@@ -100,13 +141,15 @@ def run_all(
     others = set(active_children())
     with interrupts_held():
         context = fork_server()
-    with ProcessPoolExecutor(processes, context) as pool:
+    with ProcessPoolExecutor(processes, context, prepare_worker) as pool:
         try:
             with interrupts_held():  # submitting starts the processes
-                places = {pool.submit(work, *args): i for i, args in enumerate(arguments)}
-            done = as_completed(places)
-            for future in tqdm(done, total=len(places), unit=f" {unit}", disable=not progress):
-                results[places[future]] = future.result()
+                positions = {
+                    pool.submit(run_call, work, *args): i for i, args in enumerate(arguments)
+                }
+            done = as_completed(positions)
+            for future in tqdm(done, total=len(positions), unit=f" {unit}", disable=not progress):
+                results[positions[future]] = future.result()
         except BrokenProcessPool as error:
             raise DatasetError(
                 f"a process that worked on the {unit} has died, perhaps for lack of memory"

@@ -81,21 +81,31 @@ def truth_value(name: str, value: bool) -> bool:
 def check_at_least(name: str, value: int, least: int) -> None:
     """Raise if a number is too small.
 
+    Args:
+        name: of the option, for the message.
+        value: the number.
+        least: smallest number that is allowed.
+
     Raises:
         ConfigError: it is below ``least``; the message has the name of the option.
     """
     if value < least:
-        raise ConfigError(f"{name} must be at least {least}, got {value}")
+        raise ConfigError(f"{name} must be at least {least}, got {show(value)}")
 
 
 def check_fraction(name: str, value: float) -> None:
-    """Raise if a number is no fraction of anything.
+    """Raise if a number is not between 0 and 1.
+
+    Args:
+        name: of the option, for the message.
+        value: the number.
 
     Raises:
-        ConfigError: it is below 0, above 1 or NaN; the message has the name of the option.
+        ConfigError: it is no number, below 0, above 1 or NaN; the message has the name of the
+            option.
     """
-    if not 0 <= value <= 1:
-        raise ConfigError(f"{name} is a fraction from 0 to 1, got {value}")
+    if not 0 <= _to_float(value) <= 1:
+        raise ConfigError(f"{name} is a fraction from 0 to 1, got {show(value)}")
 
 
 def is_finite_number(value: object) -> bool:
@@ -133,9 +143,11 @@ def require_torch() -> None:
 
 def _to_float(value: object) -> float:
     """Return a number as a float; NaN where it is none, infinity where it is too large for one."""
-    if isinstance(value, str | bytes | bool | np.bool_):
+    if isinstance(value, str | bytes | bytearray | memoryview | bool):
         return nan
-    if isinstance(value, np.ndarray) and value.ndim > 0:
+    if isinstance(value, np.ndarray | np.generic) and (
+        value.ndim > 0 or value.dtype.kind not in "iuf"
+    ):
         return nan
     try:
         return float(value)  # type: ignore[arg-type]

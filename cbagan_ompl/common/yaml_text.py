@@ -8,8 +8,8 @@ import yaml
 
 from ..errors import CbaganOmplError, show
 
-#: Largest YAML file that is read, in bytes: PyYAML takes seconds for a megabyte.
-MAX_YAML_BYTES = 2**18
+#: Largest YAML text that is read, in bytes: PyYAML takes up to a second for a tenth of a megabyte.
+MAX_YAML_BYTES = 2**16
 
 # Levels of lists and mappings in each other.
 _MAX_DEPTH = 20
@@ -23,21 +23,24 @@ def parse_yaml(
 ) -> Any:  # whatever the text holds
     """Return the value of a YAML text: numbers, texts, lists and mappings.
 
-    Aliases (``*name``) are refused, because a few lines of them can stand for gigabytes.
+    Aliases (``*name``) are an error, because a few lines of them can stand for gigabytes.
 
     Args:
-        text: in UTF-8 where it is bytes.
+        text: in UTF-8 where it is bytes; at most :data:`MAX_YAML_BYTES`.
         name: of the file or option, for the message.
         error_class: what to raise.
 
     Raises:
-        CbaganOmplError: of that class; the text is no YAML, or of a kind that is refused.
+        CbaganOmplError: of that class; the text is no YAML, is too long or nested too deeply, or
+            has aliases.
 
     Example:
         >>> from cbagan_ompl import ConfigError
         >>> parse_yaml("epochs: 20", "recipe.yaml", ConfigError)
         {'epochs': 20}
     """
+    if len(text) > MAX_YAML_BYTES:
+        raise error_class(f"{name}: YAML of more than {MAX_YAML_BYTES // 2**10} KiB is not read")
     try:
         return yaml.load(text, _Loader)
     except Exception as error:  # PyYAML lets whatever Python raises for odd values through

@@ -1,9 +1,10 @@
 """Generators of random maps, of many kinds that are hard for planners in different ways.
 
-A generator is a function ``(rng, width, height)`` that returns one map as a bool array (height,
-width), true where free, row 0 on top; all lengths are in pixels. The free pixels of a map are
-4-connected: pockets that no path reaches are filled. All random numbers come from ``rng``: the same
-seed gives the same map with the same versions of NumPy, SciPy and OpenCV.
+A generator is a function ``(rng, width, height)`` of a random generator and a size in pixels, both
+at least :data:`MIN_SIZE` (ConfigError otherwise). It returns one map as a bool array (height,
+width), true where free, row 0 on top. All other lengths are in pixels as well. The free pixels of a
+map are 4-connected: pockets that no path reaches are filled. All random numbers come from ``rng``:
+the same seed gives the same map with the same versions of NumPy, SciPy and OpenCV.
 """
 
 from __future__ import annotations

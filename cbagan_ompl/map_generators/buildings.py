@@ -14,6 +14,8 @@ def rooms(rng: np.random.Generator, width: int, height: int) -> Mask:
     """Generate a floor plan by recursive splitting.
 
     Walls are 3 pixels thick and have one or two doors each.
+
+    Arguments and result as for every generator, see :mod:`cbagan_ompl.map_generators`.
     """
     free, unit = canvas(width, height)
     add_frame(free, WALL)
@@ -57,7 +59,10 @@ def rooms(rng: np.random.Generator, width: int, height: int) -> Mask:
 
 
 def maze(rng: np.random.Generator, width: int, height: int) -> Mask:
-    """Generate a maze with walls of 3 pixels, and with loops where walls were removed."""
+    """Generate a maze with walls of 3 pixels, and with loops where walls were removed.
+
+    Arguments and result as for every generator, see :mod:`cbagan_ompl.map_generators`.
+    """
     free, unit = canvas(width, height)
     free[:] = False
     pitch = max(4.5 * unit, 9)  # passages of at least 6 pixels
@@ -94,7 +99,10 @@ def maze(rng: np.random.Generator, width: int, height: int) -> Mask:
 
 
 def warehouse(rng: np.random.Generator, width: int, height: int) -> Mask:
-    """Generate rows of racks along x, aisles, cross aisles, and a dock with pallets on the left."""
+    """Generate rows of racks along x, aisles, cross aisles, and a dock with pallets on the left.
+
+    Arguments and result as for every generator, see :mod:`cbagan_ompl.map_generators`.
+    """
     free, unit = canvas(width, height)
     add_frame(free, WALL)
     dock = round(0.16 * width)

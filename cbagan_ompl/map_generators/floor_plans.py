@@ -19,7 +19,10 @@ from .shapes import Mask, box, ellipse, empty_map, fill_pockets, sample_scale
 
 
 def cell_maze(rng: np.random.Generator, width: int, height: int) -> Mask:
-    """Generate a maze of long winding passages or short dead ends, with or without loops."""
+    """Generate a maze of long winding passages or short dead ends, with or without loops.
+
+    Arguments and result as for every generator, see :mod:`cbagan_ompl.map_generators`.
+    """
     pitch = sample_scale(rng, 4, min(width, height) / 4)
     wall = int(rng.integers(1, max(2, round(0.45 * pitch))))
     loops = 0.0 if rng.random() < 0.5 else rng.uniform(0.02, 0.3)
@@ -29,7 +32,10 @@ def cell_maze(rng: np.random.Generator, width: int, height: int) -> Mask:
 
 
 def room_grid(rng: np.random.Generator, width: int, height: int) -> Mask:
-    """Generate rooms of one size side by side, with doors between most of them."""
+    """Generate rooms of one size side by side, with doors between most of them.
+
+    Arguments and result as for every generator, see :mod:`cbagan_ompl.map_generators`.
+    """
     pitch = sample_scale(rng, 10, min(width, height) / 2.5)
     wall = int(rng.integers(1, max(2, pitch // 5)))
     door = int(rng.integers(2, max(3, pitch // 3)))
@@ -39,7 +45,10 @@ def room_grid(rng: np.random.Generator, width: int, height: int) -> Mask:
 
 
 def offices(rng: np.random.Generator, width: int, height: int) -> Mask:
-    """Generate rooms of many sizes and corridors by recursive splitting."""
+    """Generate rooms of many sizes and corridors by recursive splitting.
+
+    Arguments and result as for every generator, see :mod:`cbagan_ompl.map_generators`.
+    """
     free = empty_map(width, height)
     wall = int(rng.integers(1, 5))
     door = int(rng.integers(max(2, wall), 11))
@@ -55,7 +64,10 @@ def offices(rng: np.random.Generator, width: int, height: int) -> Mask:
 
 
 def shelves(rng: np.random.Generator, width: int, height: int) -> Mask:
-    """Generate one or many rows of shelves, with aisles along and across."""
+    """Generate one or many rows of shelves, with aisles along and across.
+
+    Arguments and result as for every generator, see :mod:`cbagan_ompl.map_generators`.
+    """
     free = empty_map(width, height)
     room = free.T if rng.random() < 0.5 else free
     thick, aisle = int(rng.integers(1, 9)), int(rng.integers(2, 13))
@@ -72,7 +84,10 @@ def shelves(rng: np.random.Generator, width: int, height: int) -> Mask:
 
 
 def halls(rng: np.random.Generator, width: int, height: int) -> Mask:
-    """Generate halls in solid ground, connected by passages in a tree with a few loops."""
+    """Generate halls in solid ground, connected by passages in a tree with a few loops.
+
+    Arguments and result as for every generator, see :mod:`cbagan_ompl.map_generators`.
+    """
     free = ~empty_map(width, height)
     count = int(rng.integers(4, 15))
     centres = rng.uniform((0.1, 0.1), (0.9, 0.9), (count, 2)) * (width, height)

@@ -20,7 +20,10 @@ from .shapes import (
 
 
 def walls_with_gaps(rng: np.random.Generator, width: int, height: int) -> Mask:
-    """Generate walls from border to border, one or two gaps in each, and boxes between them."""
+    """Generate walls from border to border, one or two gaps in each, and boxes between them.
+
+    Arguments and result as for every generator, see :mod:`cbagan_ompl.map_generators`.
+    """
     free, unit = canvas(width, height)
     count = max(2, round(width / (14 * unit)))
     lane = width / (count + 1)
@@ -42,14 +45,20 @@ def walls_with_gaps(rng: np.random.Generator, width: int, height: int) -> Mask:
 
 
 def clutter(rng: np.random.Generator, width: int, height: int) -> Mask:
-    """Generate boxes and ellipses of many sizes and angles on a quarter to a third of the map."""
+    """Generate boxes and ellipses of many sizes and angles on a quarter to a third of the map.
+
+    Arguments and result as for every generator, see :mod:`cbagan_ompl.map_generators`.
+    """
     free, unit = canvas(width, height)
     scatter_clutter(free, rng, unit, rng.uniform(0.25, 0.34))
     return fill_pockets(free)
 
 
 def narrow_passage(rng: np.random.Generator, width: int, height: int) -> Mask:
-    """Generate a thick wall with one straight passage of 4 to 6 pixels, and clutter beside it."""
+    """Generate a thick wall with one straight passage of 4 to 6 pixels, and clutter beside it.
+
+    Arguments and result as for every generator, see :mod:`cbagan_ompl.map_generators`.
+    """
     free, unit = canvas(width, height)
     gap, thick = int(rng.integers(4, 7)), round(rng.uniform(0.12, 0.2) * width)
     left = round(rng.uniform(0.42, 0.58) * width - thick / 2)
@@ -67,27 +76,32 @@ def bug_trap(rng: np.random.Generator, width: int, height: int) -> Mask:
 
     The opening leads through a channel that reaches far into the body, so that a tree from inside
     must grow away from a goal on the right before it gets out.
+
+    Arguments and result as for every generator, see :mod:`cbagan_ompl.map_generators`.
     """
     free, unit = canvas(width, height)
     x, y = (rng.uniform(0.48, 0.52) * side for side in (width, height))
     a, b = rng.uniform(0.26, 0.29) * width, rng.uniform(0.26, 0.3) * height
     thick, mouth = round(1.6 * unit), round(rng.uniform(2.2, 3.0) * unit)
     lip = rng.uniform(0.75, 0.9) * a
-    hollow = ellipse(free, (x, y), (a - thick, b - thick), power=3.0)
-    free &= hollow | ~ellipse(free, (x, y), (a, b), power=3.0)
+    hollow = ellipse(free, (x, y), (a - thick, b - thick), exponent=3.0)
+    free &= hollow | ~ellipse(free, (x, y), (a, b), exponent=3.0)
     # The channel of the mouth: a block across the wall on the left, with a passage cut out of it.
     channel = x - a + lip / 2
     free &= ~box(free, (channel, y), (lip / 2, mouth / 2 + thick))
     free |= box(free, (channel - unit, y), (lip / 2 + 1.5 * unit, mouth / 2))
     # A passage around the body and in front of its mouth stays clear.
-    clear = ellipse(free, (x, y), (a + 2.5 * unit, b + 2.5 * unit), power=3.0)
+    clear = ellipse(free, (x, y), (a + 2.5 * unit, b + 2.5 * unit), exponent=3.0)
     clear |= box(free, (x - a, y), (5 * unit, 3 * unit))
     scatter_clutter(free, rng, 0.8 * unit, (~free).mean() + rng.uniform(0.07, 0.11), clear)
     return fill_pockets(free)
 
 
 def blocks(rng: np.random.Generator, width: int, height: int) -> Mask:
-    """Generate axis-aligned boxes, which may overlap."""
+    """Generate axis-aligned boxes, which may overlap.
+
+    Arguments and result as for every generator, see :mod:`cbagan_ompl.map_generators`.
+    """
     free, unit = canvas(width, height)
 
     def shape(centre: Point) -> Mask:
@@ -98,7 +112,10 @@ def blocks(rng: np.random.Generator, width: int, height: int) -> Mask:
 
 
 def ellipses(rng: np.random.Generator, width: int, height: int) -> Mask:
-    """Generate ellipses at any angle."""
+    """Generate ellipses at any angle.
+
+    Arguments and result as for every generator, see :mod:`cbagan_ompl.map_generators`.
+    """
     free, unit = canvas(width, height)
 
     def shape(centre: Point) -> Mask:
@@ -110,7 +127,10 @@ def ellipses(rng: np.random.Generator, width: int, height: int) -> Mask:
 
 
 def triangles(rng: np.random.Generator, width: int, height: int) -> Mask:
-    """Generate triangles at any angle."""
+    """Generate triangles at any angle.
+
+    Arguments and result as for every generator, see :mod:`cbagan_ompl.map_generators`.
+    """
     free, unit = canvas(width, height)
 
     def shape(centre: Point) -> Mask:
@@ -121,7 +141,10 @@ def triangles(rng: np.random.Generator, width: int, height: int) -> Mask:
 
 
 def tl_shapes(rng: np.random.Generator, width: int, height: int) -> Mask:
-    """Generate shapes of the letters T and L, rotated by multiples of about 90 degrees."""
+    """Generate shapes of the letters T and L, rotated by multiples of about 90 degrees.
+
+    Arguments and result as for every generator, see :mod:`cbagan_ompl.map_generators`.
+    """
     free, unit = canvas(width, height)
 
     def shape(centre: Point) -> Mask:

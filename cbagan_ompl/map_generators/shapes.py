@@ -101,10 +101,12 @@ def box(free: Mask, centre: Point, half: Point, angle: float = 0.0) -> Mask:
     return (abs(x) <= half[0]) & (abs(y) <= half[1])
 
 
-def ellipse(free: Mask, centre: Point, half: Point, angle: float = 0.0, power: float = 2.0) -> Mask:
-    """Return the pixels of an ellipse with half axes ``half``; a power above 2 makes it squarer."""
+def ellipse(
+    free: Mask, centre: Point, half: Point, angle: float = 0.0, exponent: float = 2.0
+) -> Mask:
+    """Return the pixels of an ellipse, half axes ``half``; exponents above 2 make it squarer."""
     x, y = _rotate_pixels(free, centre, angle)
-    return abs(x / half[0]) ** power + abs(y / half[1]) ** power <= 1
+    return abs(x / half[0]) ** exponent + abs(y / half[1]) ** exponent <= 1
 
 
 def triangle(free: Mask, centre: Point, size: float, angle: float) -> Mask:

@@ -13,14 +13,20 @@ from .shapes import Mask, box, check_size, empty_map, fill_pockets, sample_scale
 
 
 def caves(rng: np.random.Generator, width: int, height: int) -> Mask:
-    """Generate caves: smooth noise, free where it is high."""
+    """Generate caves: smooth noise, free where it is high.
+
+    Arguments and result as for every generator, see :mod:`cbagan_ompl.map_generators`.
+    """
     check_size(width, height)
     noise = _sample_noise(rng, width, height, sample_scale(rng, 2, min(width, height) / 12))
     return fill_pockets(noise > np.quantile(noise, rng.uniform(0.2, 0.55)))
 
 
 def curved_walls(rng: np.random.Generator, width: int, height: int) -> Mask:
-    """Generate thin walls along the level lines of smooth noise, with gaps."""
+    """Generate thin walls along the level lines of smooth noise, with gaps.
+
+    Arguments and result as for every generator, see :mod:`cbagan_ompl.map_generators`.
+    """
     check_size(width, height)
     scale = sample_scale(rng, 5, min(width, height) / 8)
     noise = _sample_noise(rng, width, height, scale)
@@ -31,7 +37,10 @@ def curved_walls(rng: np.random.Generator, width: int, height: int) -> Mask:
 
 
 def city(rng: np.random.Generator, width: int, height: int) -> Mask:
-    """Generate streets between blocks of houses, with yards, gaps, squares and avenues."""
+    """Generate streets between blocks of houses, with yards, gaps, squares and avenues.
+
+    Arguments and result as for every generator, see :mod:`cbagan_ompl.map_generators`.
+    """
     free = empty_map(width, height)
     typical = sample_scale(rng, 8, min(width, height) / 4)
     street = int(rng.integers(2, 11))
@@ -49,7 +58,10 @@ def city(rng: np.random.Generator, width: int, height: int) -> Mask:
 
 
 def race_track(rng: np.random.Generator, width: int, height: int) -> Mask:
-    """Generate a closed race track in solid ground, sometimes with a shortcut."""
+    """Generate a closed race track in solid ground, sometimes with a shortcut.
+
+    Arguments and result as for every generator, see :mod:`cbagan_ompl.map_generators`.
+    """
     check_size(width, height)
     count = int(rng.integers(6, 13))
     angles = np.sort(rng.uniform(0, 2 * pi, count))
@@ -67,7 +79,10 @@ def race_track(rng: np.random.Generator, width: int, height: int) -> Mask:
 
 
 def blocked_cells(rng: np.random.Generator, width: int, height: int) -> Mask:
-    """Generate square cells, each blocked with the same probability."""
+    """Generate square cells, each blocked with the same probability.
+
+    Arguments and result as for every generator, see :mod:`cbagan_ompl.map_generators`.
+    """
     check_size(width, height)
     cell = sample_scale(rng, 1, min(width, height) / 32)
     shape = -(-height // cell), -(-width // cell)

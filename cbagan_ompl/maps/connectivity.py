@@ -54,5 +54,18 @@ def connects(
     """
     both = mask.copy()
     both[start[1], start[0]] = both[goal[1], goal[0]] = True
-    labels = label_components(both, connectivity=connectivity)
-    return bool(labels[start[1], start[0]] == labels[goal[1], goal[0]])
+    return in_one_component(label_components(both, connectivity=connectivity), start, goal)
+
+
+def in_one_component(
+    labels: NDArray[np.int32], start: tuple[int, int], goal: tuple[int, int]
+) -> bool:
+    """Return whether two pixels lie inside the mask and in one connected part of it.
+
+    Args:
+        labels: (H, W), from :func:`label_components`.
+        start: pixel (column, row).
+        goal: pixel (column, row).
+    """
+    label = int(labels[start[1], start[0]])
+    return label > 0 and label == int(labels[goal[1], goal[0]])

@@ -82,14 +82,18 @@ class GridMap:
         """Read a map file: PNG, JPG, BMP or PGM image, ROS map_server YAML, or MovingAI ``.map``.
 
         Args:
-            path: the file; its kind is told by its suffix. ``bundled:NAME`` reads one of the maps
-                that come with the package (see :func:`cbagan_ompl.bundled_maps`).
+            path: the file; its kind is recognised by its suffix. ``bundled:NAME`` reads one of the
+                maps that come with the package (see :func:`cbagan_ompl.bundled_maps`).
             **options: the fields of :class:`cbagan_ompl.maps.loading.MapOptions`, such as
                 ``threshold`` and ``unknown_is_free``.
 
         Raises:
             MapError: the file is missing, unreadable, truncated, empty or of an unknown kind.
             ConfigError: an unknown option, or one with a value that makes no sense.
+
+        Example:
+            >>> GridMap.load("bundled:maze")
+            GridMap('maze', 256 x 256 pixels of 1, image frame, 82% free)
         """
         return cls._of(read_map(path, **options))
 

@@ -33,7 +33,7 @@ class DecodedImage(NamedTuple):
 
 
 def decode_image(data: bytes, name: str) -> DecodedImage:
-    """Decode an image file, told by its first bytes.
+    """Decode an image file, recognised by its first bytes.
 
     Pixels are taken as stored: a rotation that the EXIF data ask for is not applied.
 

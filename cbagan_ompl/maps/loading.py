@@ -1,4 +1,4 @@
-"""Map files of every kind, told by their suffix, and the maps that come with the package.
+"""Map files of every kind, recognised by their suffix, and the maps that come with the package.
 
 Each reader returns a :class:`.raw_map.RawMap`, of which :meth:`cbagan_ompl.GridMap.load` makes the
 map.
@@ -113,14 +113,14 @@ def _read_bundled(name: str, settings: MapOptions) -> RawMap:
     return _read_image_map(data, BUNDLED + name, name, settings)
 
 
-def _read_image_map(data: bytes, place: str, name: str, settings: MapOptions) -> RawMap:
-    gray, white, opaque = decode_image(data, place)
+def _read_image_map(data: bytes, location: str, name: str, settings: MapOptions) -> RawMap:
+    gray, white, opaque = decode_image(data, location)
     free = (np.arange(white + 1) / white >= settings.threshold)[gray]
     if opaque is not None:
         free = free | ~opaque if settings.unknown_is_free else free & opaque
     if not free.any():
         raise MapError(
-            f"{place}: no pixel is opaque and as bright as the threshold {settings.threshold:g}; "
-            "choose a lower threshold, or unknown_is_free where free space is transparent"
+            f"{location}: no pixel is opaque and as bright as the threshold {settings.threshold:g};"
+            " choose a lower threshold, or unknown_is_free where free space is transparent"
         )
     return RawMap(free, name, unknown=None if opaque is None else ~opaque)

@@ -13,7 +13,7 @@ from ..common.validation import is_finite_number
 from ..errors import MapError, show
 from .frames import Origin
 
-#: Longest side and largest area of a map, in pixels. Larger files are refused before memory is
+#: Longest side and largest area of a map, in pixels. Larger files are an error before memory is
 #: spent on them: a learned plan takes about 140 bytes a pixel.
 MAX_SIDE = 16384
 MAX_PIXELS = 2**26

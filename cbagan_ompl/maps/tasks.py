@@ -10,10 +10,10 @@ from math import isfinite
 from pathlib import Path, PureWindowsPath
 
 from ..common.files import read_text
-from ..errors import MapError
+from ..errors import MapError, show
 from .grid_map import GridMap
 from .loading import BUNDLED, bundled_folder
-from .movingai import read_scenarios
+from .movingai import MAX_TASK_BYTES, MAX_TASKS, read_scenarios
 
 _COLUMNS = ("map", "start_x", "start_y", "goal_x", "goal_y")
 
@@ -26,7 +26,7 @@ class Task:
         start: (x, y) in the map's world coordinates.
         goal: (x, y) in the map's world coordinates.
         optimal_cost: length of the shortest path in world units, where it is known.
-        family: what kind of map it is on, where that is known.
+        family: the kind of map that it is on, where that is known.
 
     Example:
         >>> Task((1.5, 2.0), (14.0, -3.0)).optimal_cost is None
@@ -56,7 +56,7 @@ def load_tasks(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
     Whether the tasks can be planned for is not checked here, :meth:`GridMap.check_task` does that.
 
     Args:
-        path: the file, its kind is told by its suffix.
+        path: the file, its kind is recognised by its suffix.
         grid: the map to plan on.
 
     Raises:
@@ -109,7 +109,7 @@ def tasks_of(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
     file = Path(path)
     if file.suffix.lower() == ".map":
         for beside in (Path(f"{file}.scen"), file.with_suffix(".scen")):
-            if beside.is_file():
+            if os.path.isfile(beside):  # False also where the name is too long to be one
                 return load_tasks(beside, grid)
     return []
 
@@ -140,18 +140,21 @@ def _scen_tasks(path: Path, grid: GridMap) -> list[Task]:
 
 def _csv_tasks(path: Path, grid: GridMap) -> list[Task]:
     tasks, others = [], set()
-    reader = csv.DictReader(read_text(path).splitlines(), skipinitialspace=True)
+    lines = read_text(path, limit=MAX_TASK_BYTES).splitlines()
+    if len(lines) > MAX_TASKS:
+        raise MapError(f"{path}: {len(lines)} lines, at most {MAX_TASKS} are read")
+    reader = csv.DictReader(lines, skipinitialspace=True)
     try:
         missing = [name for name in _COLUMNS if name not in (reader.fieldnames or ())]
         if missing:
             raise MapError(f"{path}, line 1: missing columns: {', '.join(missing)}")
         for row in reader:
-            place = f"{path}, line {reader.line_num}"
+            location = f"{path}, line {reader.line_num}"
             if None in row or None in row.values():
-                raise MapError(f"{place}: expected {len(reader.fieldnames or ())} fields")
+                raise MapError(f"{location}: expected {len(reader.fieldnames or ())} fields")
             # The folders of either system are left out.
             if grid.name in (row["map"], PureWindowsPath(row["map"]).stem):
-                tasks.append(_csv_task(place, row))
+                tasks.append(_csv_task(location, row))
             else:
                 others.add(row["map"])
     except csv.Error as error:
@@ -165,19 +168,19 @@ def _csv_tasks(path: Path, grid: GridMap) -> list[Task]:
     return tasks
 
 
-def _csv_task(place: str, row: dict[str, str]) -> Task:
-    start_x, start_y, goal_x, goal_y = (_number(place, row, name) for name in _COLUMNS[1:])
-    cost = _number(place, row, "optimal_cost") if row.get("optimal_cost", "").strip() else None
+def _csv_task(location: str, row: dict[str, str]) -> Task:
+    start_x, start_y, goal_x, goal_y = (_number(location, row, name) for name in _COLUMNS[1:])
+    cost = _number(location, row, "optimal_cost") if row.get("optimal_cost", "").strip() else None
     if cost is not None and cost < 0:
-        raise MapError(f"{place}: optimal_cost is a length and cannot be {cost:g}")
+        raise MapError(f"{location}: optimal_cost is a length and cannot be {cost:g}")
     return Task((start_x, start_y), (goal_x, goal_y), cost, row.get("family") or None)
 
 
-def _number(place: str, row: dict[str, str], column: str) -> float:
+def _number(location: str, row: dict[str, str], column: str) -> float:
     try:
         number = float(row[column])
     except ValueError:
         number = float("nan")
     if not isfinite(number):
-        raise MapError(f"{place}: {column} must be a finite number, got {row[column]!r}")
+        raise MapError(f"{location}: {column} must be a finite number, got {show(row[column])}")
     return number

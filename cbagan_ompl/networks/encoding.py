@@ -1,6 +1,6 @@
 """Maps, points and regions as images for the networks, and back.
 
-The one place that knows the colours: training and the exported model both call these functions,
+The one module that knows the colours: training and the exported model both call these functions,
 so they stay within what TorchScript can compile. Images are (B, 3, H, W), red, green, blue, in
 [-1, 1]:
 

@@ -12,8 +12,8 @@ import torch
 from torch import Tensor, nn
 
 # What a cell that obstacles fill adds to the logarithm of the costs of the steps from it, before
-# anything is learned. Distance fields that spread through walls teach little: without it runs take
-# several epochs to find out, and with few cost maps some never do.
+# anything is learned. Distance fields that spread through walls train the network badly: without it
+# runs take several epochs to find out, and with few cost maps some never do.
 _INITIAL_WALL_COST = 4.0
 
 
@@ -163,13 +163,13 @@ def differentiable_distances(distance: Tensor, costs: Tensor, source: Tensor) ->
     with torch.no_grad():
         candidates = torch.stack(neighbours(_add_frame(distance, 1e4))) + costs
         best, direction = candidates.min(0)
-        ends = source | (best >= 1e4)
+        is_root = source | (best >= 1e4)
         cells = torch.arange(height * width, device=costs.device).view(height, width, 1)
         numbers = torch.stack(neighbours(_add_frame(cells, 0.0))).unsqueeze(1)
         predecessor = torch.where(
-            ends, cells, numbers.expand(costs.size()).gather(0, direction[None])[0]
+            is_root, cells, numbers.expand(costs.size()).gather(0, direction[None])[0]
         )
-    path = costs.gather(0, direction[None])[0].masked_fill(ends, 0.0).flatten(1, 2)
+    path = costs.gather(0, direction[None])[0].masked_fill(is_root, 0.0).flatten(1, 2)
     predecessor = predecessor.flatten(1, 2)
     length = 1
     while length < height * width:

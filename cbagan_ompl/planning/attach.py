@@ -38,7 +38,19 @@ class Attachment:
     Attributes:
         hook: name of the hook in use.
 
-    Example: see :func:`attach`, which makes it.
+    Example:
+        >>> from ompl import geometric as og, util as ou
+        >>> from cbagan_ompl import GridMap, Heatmap, tasks_of
+        >>> from cbagan_ompl.planning.problem import make_setup
+        >>> ou.setLogLevel(ou.LOG_NONE)
+        >>> grid = GridMap.load("bundled:maze")
+        >>> task = tasks_of("bundled:maze", grid)[0]
+        >>> setup = make_setup(grid, grid.check_task(task.start, task.goal), tolerance=1.0)
+        >>> setup.setPlanner(og.RRTstar(setup.getSpaceInformation()))
+        >>> attachment = attach(setup, Heatmap.uniform(grid))
+        >>> attachment.hook, attachment.sample_counts
+        ('goal-injection', {'learned': 0, 'uniform': 0})
+        >>> attachment.detach()
     """
 
     def __init__(self, hook: str, sampler: HeatmapSampler, undo: Callable[[], None]) -> None:

@@ -1,17 +1,14 @@
-"""The one place that knows how OMPL's Python bindings differ between versions.
+"""The one module that knows how OMPL's Python bindings differ between versions.
 
-Two generations of wheels are served: 1.7 (Boost.Python) and 2.0 (nanobind). Features are told by
-what the bindings offer, not by version number, so that a build that binds more is used better.
+Two generations of wheels are served: 1.7 (Boost.Python) and 2.0 (nanobind). Features are recognised
+by what the bindings offer, not by version number, so that a build that binds more is used better.
 """
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, redirect_stdout
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
-from io import StringIO
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -96,26 +93,6 @@ def new_benchmark(
 def benchmark_request() -> Any:
     """Return what ``Benchmark.benchmark`` takes: limits and options, as attributes to set."""
     return ot.Benchmark.Request() if BOOST_PYTHON else ot.Request()
-
-
-def fill_statistics_database(logs: Sequence[Path], database: Path) -> bool:
-    """Run OMPL's own ``ompl_benchmark_statistics`` on logs.
-
-    Args:
-        logs: that Benchmark has saved.
-        database: SQLite file to be written.
-
-    Returns:
-        Whether this build has it: OMPL 1.7 does not.
-    """
-    if not hasattr(ot, "readBenchmarkLog"):
-        return False
-    # It prints what it reads, and leaves closing the database to the garbage collector.
-    with redirect_stdout(StringIO()), warnings.catch_warnings():
-        warnings.simplefilter("ignore", ResourceWarning)
-        ot.readBenchmarkLog(str(database), [str(log) for log in logs], False)
-        ot.computeViews(str(database), False)
-    return True
 
 
 def plane_space(low: NDArray[np.float64], high: NDArray[np.float64]) -> Any:
@@ -212,9 +189,9 @@ def tree_edges(data: Any) -> NDArray[np.float64]:
 def _edges_from(data: Any, vertex: int) -> list[int]:
     if not BOOST_PYTHON:
         return list(data.getEdges(vertex))
-    ends = ou.vectorUint()
-    data.getEdges(vertex, ends)
-    return list(ends)
+    targets = ou.vectorUint()
+    data.getEdges(vertex, targets)
+    return list(targets)
 
 
 def planner_class(name: str) -> Any:

@@ -55,7 +55,7 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
         return distance
 
     def maxSampleCount(self) -> int:  # noqa: N802
-        """Return no end of samples for the planner, the original's number for anybody else."""
+        """Return a number without limit to the planner, the original's number to other callers."""
         return _ENDLESS if self._monitor.is_sampling() else int(self._original.maxSampleCount())
 
     def couldSample(self) -> bool:  # noqa: N802
@@ -63,7 +63,7 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
         return True
 
     def sampleGoal(self, state: Any) -> None:  # noqa: N802
-        """Sample the heat map for the planner, the original goal for anybody else."""
+        """Sample the heat map for the planner, the original goal for other callers."""
         monitor = self._monitor
         sampling = monitor.is_sampling()
         monitor.note_sample()

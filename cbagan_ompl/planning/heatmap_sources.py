@@ -21,8 +21,13 @@ UNIFORM = "uniform"
 #: The sampler of a network: the bundled model, unless another one is given.
 LEARNED = "learned"
 
-#: Names of the samplers; "uniform" is OMPL's own, untouched.
-SAMPLERS = (LEARNED, UNIFORM, "corridor", "straight-line")
+#: Every sampler by its name, with what it samples.
+SAMPLERS = {
+    LEARNED: "the heat map of a network",
+    UNIFORM: "OMPL's own, untouched",
+    "corridor": "a band around the path of a grid search",
+    "straight-line": "a band around the straight line from start to goal",
+}
 
 #: What a result names its sampler when the caller brought the heat map.
 OWN_HEATMAP = "heatmap"
@@ -67,5 +72,11 @@ def heatmap_source(
         from ..inference.predictor import Predictor, load_model
 
         return sampler, (model if isinstance(model, Predictor) else load_model(model)).predict
-    sources = {"corridor": Heatmap.corridor, "straight-line": Heatmap.straight_line}
-    return sampler, sources.get(sampler)
+    return sampler, _CONTROLS.get(sampler)
+
+
+# The heat maps that need no model.
+_CONTROLS: dict[str, HeatmapSource] = {
+    "corridor": Heatmap.corridor,
+    "straight-line": Heatmap.straight_line,
+}

@@ -24,7 +24,7 @@ class PlannerTraits:
         hook: what it samples from: :data:`STATE_SAMPLER`, :data:`VALID_STATE_SAMPLER` or
             :data:`GOAL_INJECTION`.
         stops_at_first: whether its solve ends with the first path.
-        keeps_sampler: whether it makes its sampler when it is set up and keeps it for good.
+        keeps_sampler: whether it makes its sampler when it is set up and keeps it from then on.
         hangs_with: the bindings, see :data:`.compat.BINDINGS`, with which a solve never returns
             when its termination condition is a Python function; None for no bindings.
     """
@@ -112,7 +112,7 @@ def stops_at_first(planner: str) -> bool:
 
 
 def keeps_sampler(planner: str) -> bool:
-    """Return whether a planner makes its sampler when it is set up and keeps it for good."""
+    """Return whether a planner makes its sampler when it is set up and keeps it from then on."""
     return planner in PLANNERS and PLANNERS[planner].keeps_sampler
 
 

@@ -26,10 +26,10 @@ class PlanResult:
         ompl_version: of the installed package.
         seed: what makes the samples of this run again.
         map: name of the map.
-        start: (x, y).
-        goal: (x, y).
-        goal_tolerance: how far from the goal a path may end.
-        path: (N, 2); empty when not solved.
+        start: (x, y), world, as in :class:`cbagan_ompl.GridMap`.
+        goal: (x, y), world.
+        goal_tolerance: how far from the goal a path may end, world units.
+        path: way points from start to goal, (N, 2), world; empty when not solved.
         cost: length of the path; infinite when not solved.
         inference_s: making the heat map and attaching it, loading the model not included.
         planning_s: inside the planner's ``solve``.
@@ -45,9 +45,16 @@ class PlanResult:
         sample_counts: ``{"learned": n, "uniform": m}`` samples that the planner had from the heat
             map's hook; both 0 for the uniform sampler, which has no hook.
         heatmap: what was sampled; None for the uniform sampler. Not part of the JSON.
-        tree: edges of the planner's tree, (M, 2, 2), when asked for. Not part of the JSON.
+        tree: edges of the planner's tree, (M, 2, 2): two points (x, y) each, world; when asked for.
+            Not part of the JSON.
 
-    Example: see :func:`cbagan_ompl.plan`, which returns it.
+    Example:
+        >>> from cbagan_ompl import plan
+        >>> result = plan("bundled:maze", (10, 10), (245, 245), sampler="corridor", seed=1)
+        >>> result.solved, result.path[0].tolist(), result.sample_counts["learned"] > 0
+        (True, [10.0, 10.0], True)
+        >>> result.to_dict()["goal"]
+        [245.0, 245.0]
     """
 
     solved: bool

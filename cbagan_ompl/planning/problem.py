@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ConfigError
+from ..errors import ConfigError, show
 from ..maps.grid_map import GridMap
 from . import compat
 from .compat import og
@@ -49,7 +49,15 @@ def make_setup(grid: GridMap, endpoints: Endpoints, tolerance: float) -> Any:
 
 
 def set_range(planner: Any, range: float) -> bool:
-    """Set the longest edge of a planner, world units; False where it has no such parameter."""
+    """Set the longest edge of a planner.
+
+    Args:
+        planner: an OMPL planner.
+        range: the length, world units.
+
+    Returns:
+        Whether the planner has this parameter.
+    """
     has_range = hasattr(planner, "setRange")
     if has_range:
         planner.setRange(float(range))
@@ -66,7 +74,7 @@ def set_parameter(planner: Any, name: str, value: bool | float | str) -> None:
         value: what the setter is called with.
 
     Raises:
-        ConfigError: the planner has no such setter, or the setter refuses the value.
+        ConfigError: the planner has no such setter, or the setter does not take the value.
     """
     setters = {
         setter.removeprefix("set").lower(): setter
@@ -77,15 +85,14 @@ def set_parameter(planner: Any, name: str, value: bool | float | str) -> None:
     wanted = name.replace("_", "")
     if wanted not in setters:
         raise ConfigError(
-            f"{kind} has no parameter {name!r} to set; its setters are "
+            f"{kind} has no parameter {show(name)} to set; its setters are "
             f"{', '.join(setters.values())}"
         )
     try:
         getattr(planner, setters[wanted])(value)
-    # Boost.Python's ArgumentError is a TypeError.
-    except TypeError as error:
+    except Exception as error:  # whatever the bindings, and OMPL itself, raise
         raise ConfigError(
-            f"{kind}.{setters[wanted]} does not take {value!r} ({type(value).__name__})"
+            f"{kind}.{setters[wanted]} does not take {show(value)} ({type(value).__name__})"
         ) from error
 
 
@@ -94,9 +101,9 @@ def checked_path(
 ) -> NDArray[np.float64] | None:
     """Return the path that a setup has, (N, 2); None when it is no path of the task after all."""
     path = compat.path_positions(setup.getSolutionPath())
-    starts = np.array_equal(path[0], endpoints[0])
-    ends = np.hypot(*(path[-1] - endpoints[1])) <= tolerance + _ROUNDING
-    return path if starts and ends and grid.path_is_free(path) else None
+    at_start = np.array_equal(path[0], endpoints[0])
+    at_goal = np.hypot(*(path[-1] - endpoints[1])) <= tolerance + _ROUNDING
+    return path if at_start and at_goal and grid.path_is_free(path) else None
 
 
 def path_length(path: NDArray[np.float64]) -> float:

@@ -19,7 +19,13 @@ class StateAccess(Protocol):
         """Return the (x, y) of a state."""
 
     def write(self, state: Any, x: float, y: float) -> None:
-        """Set the position of a state to a sample; anything else in the state becomes uniform."""
+        """Set the position of a state to a sample; anything else in the state becomes uniform.
+
+        Args:
+            state: a state of the space, changed in place.
+            x: of the sample, world.
+            y: of the sample, world.
+        """
 
 
 class PlaneStateAccess:
@@ -32,7 +38,7 @@ class PlaneStateAccess:
 
     @staticmethod
     def write(state: Any, x: float, y: float) -> None:
-        """Set (x, y)."""
+        """Set (x, y); arguments as for :meth:`StateAccess.write`."""
         state[0] = x
         state[1] = y
 
@@ -53,7 +59,7 @@ class PoseStateAccess:
         return state.getX(), state.getY()
 
     def write(self, state: Any, x: float, y: float) -> None:
-        """Set (x, y) and sample a heading."""
+        """Set (x, y) and sample a heading; arguments as for :meth:`StateAccess.write`."""
         state.setX(x)
         state.setY(y)
         state.setYaw(float(self._rng.uniform(-pi, pi)))

@@ -1,1 +1,1 @@
-"""Heat maps and the samples drawn from them. Knows nothing of OMPL or torch."""
+"""Heat maps and samplers of them. Knows nothing of OMPL or torch."""

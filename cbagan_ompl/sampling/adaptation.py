@@ -74,7 +74,13 @@ class AdaptiveMixture:
             self.covered = None
 
     def on_new_node(self, x: float, y: float, in_goal: bool) -> None:
-        """Note that the tree has a new node at (x, y), world."""
+        """Note that the tree has a new node.
+
+        Args:
+            x: of the node, world.
+            y: of the node, world.
+            in_goal: whether the node is in the goal region.
+        """
         if not self._is_watching:
             return
         if self._is_in_goal and not in_goal:
@@ -102,7 +108,7 @@ class AdaptiveMixture:
     def on_exhausted(self) -> None:
         """Note that the tree covers whatever the heat map offers.
 
-        That is how a tree looks that was cleared meanwhile, so its nodes are counted now and then.
+        This also happens after the tree was cleared, so its nodes are counted now and then.
         """
         self._exhausted_count += 1
         if self._exhausted_count > self._tree.node_count:

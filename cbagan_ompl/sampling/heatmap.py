@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import HeatmapError
-from ..maps.connectivity import label_components
+from ..maps.connectivity import in_one_component, label_components
 from ..maps.grid_map import GridMap
 from ..maps.grid_search import pull_taut, shortest_path
 
@@ -81,8 +81,21 @@ class Heatmap:
     def load(cls, path: str | PathLike[str], grid: GridMap) -> Heatmap:
         """Read a heat map of a grid: a grey image (black 0, white 1) or a NumPy ``.npy`` array.
 
+        Args:
+            path: the file; what does not end in ``.npy`` is read as an image.
+            grid: the map. Pixels correspond one by one, row 0 on top, whatever its world frame.
+
         Raises:
             HeatmapError: the file cannot be read, or holds no heat map of this grid.
+
+        Example:
+            >>> from pathlib import Path
+            >>> from tempfile import TemporaryDirectory
+            >>> with TemporaryDirectory() as folder:
+            ...     path = Path(folder) / "heat.npy"
+            ...     np.save(path, np.array([[0.2, 1.0]]))
+            ...     Heatmap.load(path, GridMap([[1, 1]])).region.tolist()
+            [[False, True]]
         """
         source = Path(path)
         try:
@@ -102,6 +115,10 @@ class Heatmap:
 
         Args:
             grid: the map.
+
+        Example:
+            >>> Heatmap.uniform(GridMap([[1, 0], [1, 1]])).values.tolist()
+            [[1.0, 0.0], [1.0, 1.0]]
         """
         return cls(grid.free, grid)
 
@@ -116,6 +133,10 @@ class Heatmap:
 
         Raises:
             TaskError: see :meth:`GridMap.check_task`.
+
+        Example:
+            >>> Heatmap.straight_line(GridMap.load("bundled:rooms"), (20, 20), (230, 20))
+            Heatmap('rooms', region 6% of free space)
         """
         endpoints = grid.check_task(start, goal)
         return cls(
@@ -139,6 +160,11 @@ class Heatmap:
 
         Raises:
             TaskError: see :meth:`GridMap.check_task`.
+
+        Example:
+            >>> heatmap = Heatmap.corridor(GridMap.load("bundled:rooms"), (20, 20), (230, 230))
+            >>> heatmap.connects((20, 20), (230, 230))
+            True
         """
         endpoints = grid.to_pixel(grid.check_task(start, goal))
         pixels = shortest_path(grid.free, *pixel_pair(endpoints))
@@ -162,13 +188,16 @@ class Heatmap:
         Args:
             start: (x, y), world.
             goal: (x, y), world.
+
+        Example:
+            >>> heatmap = Heatmap([[1.0, 0.2, 1.0]], GridMap([[1, 1, 1]]))
+            >>> heatmap.connects((0.5, 0.5), (2.5, 0.5))
+            False
         """
         endpoints = np.array((start, goal), dtype=np.float64)
         if not self.grid.is_free(endpoints).all():
             return False
-        first, second = pixel_pair(self.grid.to_pixel(endpoints))
-        label = int(self.components[first[1], first[0]])
-        return label > 0 and label == int(self.components[second[1], second[0]])
+        return in_one_component(self.components, *pixel_pair(self.grid.to_pixel(endpoints)))
 
     def connected(self, start: ArrayLike, goal: ArrayLike) -> Heatmap:
         """Return this heat map with a region that connects start and goal.
@@ -185,6 +214,11 @@ class Heatmap:
 
         Raises:
             TaskError: see :meth:`GridMap.check_task`.
+
+        Example:
+            >>> heatmap = Heatmap([[1.0, 0.2, 1.0]], GridMap([[1, 1, 1]]))
+            >>> heatmap.connected((0.5, 0.5), (2.5, 0.5)).region.tolist()
+            [[True, True, True]]
         """
         endpoints = self.grid.to_pixel(self.grid.check_task(start, goal))
         if self.connects(start, goal):

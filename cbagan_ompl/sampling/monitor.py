@@ -29,7 +29,7 @@ class Monitor(Protocol):
 
 
 class NoMonitor:
-    """The monitor of a sampler that feeds no planner, or one that does not let itself be seen."""
+    """The monitor of a sampler that feeds no planner, or one that cannot be observed."""
 
     def best_cost(self) -> float:
         """Return infinity: no solution is ever seen."""

@@ -29,7 +29,7 @@ class HeatmapSampler:
     Attributes:
         heatmap: what is sampled.
         rng: the generator of the samples, and of whatever else belongs to the same run.
-        chance: returns a number in [0, 1) at each call, drawn from it.
+        chance: returns a random number of ``rng`` in [0, 1) at each call.
 
     Args:
         heatmap: what to sample.
@@ -136,16 +136,25 @@ class HeatmapSampler:
         return point
 
     def near(self, x: float, y: float, distance: float) -> tuple[float, float]:
-        """Return a sample within ``distance`` of (x, y) along each axis, world units.
+        """Return a sample (x, y) near a point: in OMPL's neighbourhood of a RealVectorStateSpace.
 
-        That box is OMPL's neighbourhood of a RealVectorStateSpace.
+        Args:
+            x: of the point, world.
+            y: of the point, world.
+            distance: largest distance from the point along each axis, world units.
         """
         low = np.maximum((x - distance, y - distance), self._box[0])
         high = np.minimum((x + distance, y + distance), self._box[1])
         return self._pick(self.rng.uniform(low, np.maximum(low, high), (_LOCAL_CANDIDATES, 2)))
 
     def gaussian(self, x: float, y: float, deviation: float) -> tuple[float, float]:
-        """Return a sample around (x, y) with a standard deviation along each axis, world units."""
+        """Return a sample (x, y) that is normally distributed around a point.
+
+        Args:
+            x: of the point, world.
+            y: of the point, world.
+            deviation: standard deviation along each axis, world units.
+        """
         candidates = self.rng.normal((x, y), deviation, (_LOCAL_CANDIDATES, 2))
         return self._pick(np.clip(candidates, *self._box))
 

@@ -60,7 +60,7 @@ _DESCRIPTIONS = ("config", "dataset", "history", "test", "trivial")
 
 
 def save_checkpoint(state: dict[str, Any], path: Path) -> None:
-    """Write a checkpoint so that a reader, or an interruption, never meets half a file.
+    """Write a checkpoint whole or not at all, whoever reads it or interrupts this.
 
     Raises:
         ModelError: the file cannot be written.

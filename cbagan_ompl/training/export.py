@@ -206,7 +206,7 @@ point discriminator, exported as TorchScript on {record["date"]} with torch {rec
 - Output: {record["outputs"]}
 - Parameters: {record["parameters"]:,}
 - Maps are scaled to {record["working_size"]} pixels on the longer side, the size of the training
-  images; small ones to twice their size.
+  images; small ones are enlarged to twice their size at most.
 
 ## Data
 

@@ -332,5 +332,5 @@ def _finish(
 def _summarize(scores: dict[str, float]) -> str:
     return (
         f"region IoU {scores['iou']:.3f}, Dice {scores['dice']:.3f}, "
-        f"connectivity {scores['connectivity']:.1%}"
+        f"connected (8) {scores['connectivity']:.1%}"
     )

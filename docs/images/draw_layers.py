@@ -1,4 +1,4 @@
-"""Draw layers.svg, the picture of the layers in the page on the design.
+"""Draw layers.svg, the figure of the layers on the design page.
 
 python docs/images/draw_layers.py
 """

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from helpers.benchmarks import Finished
-from helpers.logs import NO_DRAWS, make_log, solved, unsolved
+from helpers.logs import NO_SAMPLES, make_log, solved, unsolved
 
 from cbagan_ompl.benchmarking.measures import (
     cost_history,
@@ -38,7 +38,7 @@ def test_costs_come_from_the_log_where_the_planner_tells_none() -> None:
         {"time REAL": "0.3", "best cost REAL": "9"},
         {"time REAL": "0.4", "best cost REAL": "8"},
     ]
-    record = RunRecord(0.0, NO_DRAWS, 1, 7.5, [])
+    record = RunRecord(0.0, NO_SAMPLES, 1, 7.5, [])
     assert cost_history(record, points, 0.5) == [(0.2, 9.0), (0.4, 8.0), (0.5, 7.5)]
     assert cost_history(record, (), 0.5) == [(0.5, 7.5)]
     assert cost_history(unsolved(), points, 0.5) == []

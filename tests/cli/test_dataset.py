@@ -47,7 +47,7 @@ def test_archives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with tarfile.open(archive, "w:gz") as tar:
         tar.add(folder, "inner/small")
     assert main(["dataset", "import", str(archive), "--json", str(tmp_path / "set.json")]) == 0
-    assert "labels that connect start and goal:  100.00%" in capsys.readouterr().out
+    assert "labels that connect start and goal (8):  100.00%" in capsys.readouterr().out
     values = json.loads((tmp_path / "set.json").read_text())
     assert (values["maps"], values["blocked_ends"], values["repeated_tasks"]) == (6, 0, 0)
 
@@ -62,6 +62,7 @@ def test_a_split_needs_a_copy(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert not (tmp_path / "copy").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("interruptible")
 def test_an_interrupt_says_how_to_continue(tmp_path: Path) -> None:
     words = ["dataset", "generate", "--output", str(tmp_path), "--maps", "500", "--runs", "5"]

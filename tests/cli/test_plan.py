@@ -18,13 +18,13 @@ MAP = "bundled:walls_with_gaps"
 QUICK = ["plan", MAP, "--sampler", "corridor", "--planner", "RRT", "--time", "5", "--range", "20"]
 
 
-def test_plan_writes_picture_and_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    picture, report = tmp_path / "plan.png", tmp_path / "plan.json"
-    status = main([*QUICK, "--seed", "1", "--output", str(picture), "--json", str(report)])
+def test_plan_writes_figure_and_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    figure, report = tmp_path / "plan.png", tmp_path / "plan.json"
+    status = main([*QUICK, "--seed", "1", "--output", str(figure), "--json", str(report)])
     printed = capsys.readouterr()
     assert status == 0
     assert printed.err == ""
-    assert str(picture) in printed.out
+    assert str(figure) in printed.out
     values = json.loads(report.read_text())
     assert values["solved"] is True
     assert values["sampler"] == "corridor"
@@ -33,7 +33,7 @@ def test_plan_writes_picture_and_json(tmp_path: Path, capsys: pytest.CaptureFixt
     assert grid.path_is_free(values["path"])
     task = tasks_of(MAP, grid)[0]
     np.testing.assert_array_equal(values["start"], task.start)
-    image = cv2.imread(str(picture))
+    image = cv2.imread(str(figure))
     assert min(image.shape[:2]) > 500
 
 
@@ -47,8 +47,8 @@ def test_start_and_goal_and_seed(tmp_path: Path) -> None:
     (x0, y0), (x1, y1) = (task := tasks_of(MAP, grid)[1]).start, task.goal
     reports = []
     for name in ("one.json", "two.json"):
-        ends = ["--start", f"{x0},{y0}", "--goal", f"{x1},{y1}", "--seed", "7"]
-        assert main([*QUICK, *ends, "--json", str(tmp_path / name)]) == 0
+        endpoints = ["--start", f"{x0},{y0}", "--goal", f"{x1},{y1}", "--seed", "7"]
+        assert main([*QUICK, *endpoints, "--json", str(tmp_path / name)]) == 0
         reports.append(json.loads((tmp_path / name).read_text()))
     assert reports[0]["path"] == reports[1]["path"]
     assert main([*QUICK, "--task", "1", "--seed", "7", "--json", str(tmp_path / "three.json")]) == 0
@@ -63,8 +63,8 @@ def test_negative_coordinates(tmp_path: Path) -> None:
     )
     arguments = ["plan", str(tmp_path / "hall.yaml"), "--sampler", "corridor", "--planner", "RRT"]
     report = tmp_path / "plan.json"
-    ends = ["--start", "-2.5,-1.5", "--goal", "-1,.5"]
-    assert main([*arguments, *ends, "--json", str(report)]) == 0
+    endpoints = ["--start", "-2.5,-1.5", "--goal", "-1,.5"]
+    assert main([*arguments, *endpoints, "--json", str(report)]) == 0
     assert json.loads(report.read_text())["start"] == [-2.5, -1.5]
 
 
@@ -157,7 +157,7 @@ def test_reader_that_goes_away() -> None:
         ["evaluate", "--dataset", "set"],
     ],
 )
-def test_json_without_its_folder_is_refused_before_the_work(
+def test_json_without_its_folder_is_an_error_before_the_work(
     words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "none" / "x.json"

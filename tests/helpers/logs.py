@@ -9,7 +9,7 @@ from cbagan_ompl.benchmarking.logs import ExperimentLog, PlannerLog
 from cbagan_ompl.benchmarking.measures import WITHIN_PERCENT, add_measures
 from cbagan_ompl.planning.ompl_benchmark import RunRecord
 
-NO_DRAWS = {"learned": 0, "uniform": 0}
+NO_SAMPLES = {"learned": 0, "uniform": 0}
 
 
 def make_log(
@@ -37,8 +37,8 @@ def make_log(
 
 
 def solved(*costs: tuple[float, float], inference: float = 0.0, checks: int = 10) -> RunRecord:
-    return RunRecord(inference, NO_DRAWS, checks, costs[-1][1], list(costs))
+    return RunRecord(inference, NO_SAMPLES, checks, costs[-1][1], list(costs))
 
 
 def unsolved(inference: float = 0.0) -> RunRecord:
-    return RunRecord(inference, NO_DRAWS, 50, inf, [])
+    return RunRecord(inference, NO_SAMPLES, 50, inf, [])

@@ -126,7 +126,7 @@ def test_no_sampled_point_of_a_free_segment_is_blocked(
 
 
 @given(masks, points, points)
-def test_a_refused_segment_comes_close_to_a_blocked_pixel(
+def test_a_blocked_segment_comes_close_to_a_blocked_pixel(
     cells: list[bool], start: tuple[float, float], end: tuple[float, float]
 ) -> None:
     free = np.array(cells).reshape(HEIGHT, WIDTH)

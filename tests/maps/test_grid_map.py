@@ -1,4 +1,4 @@
-"""GridMap: frames, exact checks of segments, inflation, tasks, refusals."""
+"""GridMap: frames, exact checks of segments, inflation, tasks, errors."""
 
 from __future__ import annotations
 
@@ -159,12 +159,12 @@ def test_inflated_leaves_what_needs_no_change():
 
 
 @pytest.mark.parametrize("radius", [-1, np.nan, np.inf])
-def test_inflated_refuses_what_is_no_length(radius):
+def test_inflated_raises_for_what_is_no_length(radius):
     with pytest.raises(MapError, match="at least 0"):
         GridMap([[1, 0]]).inflated(radius)
 
 
-def test_inflated_refuses_when_nothing_stays_free():
+def test_inflated_raises_when_nothing_stays_free():
     with pytest.raises(MapError, match="fits nowhere on this map"):
         GridMap([[1, 0, 1]]).inflated(2)
 
@@ -212,7 +212,7 @@ def test_check_task_says_what_is_wrong(divided, start, goal, message):
         divided.check_task(start, goal)
 
 
-# --- refusals ---------------------------------------------------------------------------------
+# --- errors -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

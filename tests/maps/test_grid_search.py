@@ -33,9 +33,9 @@ def test_nothing_joins() -> None:
 
 
 def test_price_moves_the_path() -> None:
-    price = np.ones((11, 11), np.float32)
-    price[:8, 5] = 100
-    path = shortest_path(np.ones((11, 11), bool), (0, 5), (10, 5), price)
+    cost = np.ones((11, 11), np.float32)
+    cost[:8, 5] = 100
+    path = shortest_path(np.ones((11, 11), bool), (0, 5), (10, 5), cost)
     assert path is not None
     assert path[:, 1].max() >= 8
 

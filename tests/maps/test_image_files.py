@@ -159,7 +159,7 @@ def test_damaged_image(tmp_path):
         b"\xff\xd8\xff\xff\xc0\0\x0b\x08" + struct.pack(">HHB", 60_000, 60_000, 1) + b"\x01\x11\0",
     ],
 )
-def test_huge_images_are_refused_by_their_header(tmp_path, data):
+def test_huge_images_raise_by_their_header(tmp_path, data):
     path = tmp_path / "huge.png"
     path.write_bytes(data)
     with pytest.raises(MapError, match=f"huge.png: .* maps up to {MAX_SIDE} pixels"):

@@ -1,4 +1,4 @@
-"""Map files of every kind, told by their suffix; options; the bundled maps."""
+"""Map files of every kind, recognised by their suffix; options; the bundled maps."""
 
 from __future__ import annotations
 

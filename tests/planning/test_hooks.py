@@ -97,7 +97,7 @@ def test_planner_draws_from_the_heatmap(
         assert attachment.hook == reached_planners()[planner]
         status = setup.solve(0.4)
         assert attachment.sample_counts["learned"] > 20
-        # STRIDE draws around its nodes, half of which lie where the heat map is 0.
+        # STRIDE samples around its nodes, half of which lie where the heat map is 0.
         least = 0.5 if planner == "STRIDE" else 1.0
         assert attachment.sample_counts["learned"] > least * attachment.sample_counts["uniform"]
         if compat.is_exact(status):
@@ -113,10 +113,10 @@ def test_nearly_all_samples_are_ours(two_walls: GridMap, corridor: Heatmap, plan
     with attach(setup, corridor, seed=2, adaptation=NO_ADAPTATION) as attachment:
         condition, iterations = until(lambda: False, limit=1500)
         setup.solve(condition)
-        share = sum(attachment.sample_counts.values()) / iterations[0]
-        assert share >= 0.8
+        fraction = sum(attachment.sample_counts.values()) / iterations[0]
+        assert fraction >= 0.8
         if attachment.hook == "goal-injection":
-            assert share <= 1
+            assert fraction <= 1
         assert (
             0.85
             < attachment.sample_counts["learned"] / sum(attachment.sample_counts.values())
@@ -150,7 +150,7 @@ def first_solutions(grid: GridMap, planner: str, heatmap: Heatmap | None) -> np.
 def test_all_uniform_is_as_good_as_plain_ompl(planner: str) -> None:
     """On a map of thin walls, where uniform over free space is nearly uniform over the bounds.
 
-    OMPL's own draws fall into obstacles too, so that where there are many, ours do better.
+    OMPL's own samples fall into obstacles too, so that where there are many, ours do better.
     """
     free = np.ones((256, 256), bool)
     free[64:66, :200] = False
@@ -162,7 +162,7 @@ def test_all_uniform_is_as_good_as_plain_ompl(planner: str) -> None:
 
 
 def test_informed_costs_match_plain_ompl(two_walls: GridMap) -> None:
-    """The informed set is kept: uniform draws through the hook converge like OMPL's own."""
+    """The informed set is kept: uniform samples through the hook converge like OMPL's own."""
     costs: dict[bool, list[float]] = {False: [], True: []}
     for hooked in costs:
         for seed in range(7):
@@ -211,11 +211,11 @@ def test_solve_again_and_detach(two_walls: GridMap, corridor: Heatmap, planner: 
     for _ in range(3):
         setup.clear()
         setup.solve(0.15)
-        assert attachment.sample_counts["learned"] > seen, "each run draws"
+        assert attachment.sample_counts["learned"] > seen, "each run samples"
         seen = attachment.sample_counts["learned"]
     if planner == "InformedRRTstar":
         setup.solve(0.1)
-        assert attachment.sample_counts["learned"] > seen, "a run that goes on draws"
+        assert attachment.sample_counts["learned"] > seen, "a run that goes on samples"
     attachment.detach()
     attachment.detach()
     seen = attachment.sample_counts["learned"]
@@ -239,7 +239,7 @@ def test_poses(two_walls: GridMap, corridor: Heatmap, kind: str, planner: str) -
     setup = make_setup(two_walls, planner, space)
     with attach(setup, corridor, seed=0) as attachment:
         setup.solve(0.4)
-        # PRM ends with its first path, after a few dozen draws.
+        # PRM ends with its first path, after a few dozen samples.
         assert attachment.sample_counts["learned"] > (10 if planner == "PRM" else 50)
         assert attachment.sample_counts["learned"] > attachment.sample_counts["uniform"]
         path = setup.getSolutionPath()
@@ -274,7 +274,7 @@ def test_attach_needs_planner_and_task(two_walls: GridMap, corridor: Heatmap) ->
         attach(setup, corridor)
 
 
-def test_other_spaces_are_refused(corridor: Heatmap) -> None:
+def test_other_spaces_raise(corridor: Heatmap) -> None:
     space = ob.RealVectorStateSpace(3)
     bounds = ob.RealVectorBounds(3)
     bounds.setLow(0.0)
@@ -282,11 +282,11 @@ def test_other_spaces_are_refused(corridor: Heatmap) -> None:
     space.setBounds(bounds)
     setup = og.SimpleSetup(space)
     setup.setPlanner(og.RRT(setup.getSpaceInformation()))
-    ends = compat.new_state(space), compat.new_state(space)
-    for end, value in zip(ends, (0.1, 0.9), strict=True):
+    endpoints = compat.new_state(space), compat.new_state(space)
+    for endpoint, value in zip(endpoints, (0.1, 0.9), strict=True):
         for axis in range(3):
-            end[axis] = value
-    setup.setStartAndGoalStates(*ends)
+            endpoint[axis] = value
+    setup.setStartAndGoalStates(*endpoints)
     with pytest.raises(PlannerError, match="RealVectorStateSpace of dimension 3"):
         attach(setup, corridor)
 
@@ -358,7 +358,7 @@ def test_attach_with_informed_sampling_of_rrtstar(two_walls: GridMap, corridor: 
     assert setup.getPlanner().getInformedSampling()
 
 
-def test_attach_twice_is_refused(two_walls: GridMap, corridor: Heatmap) -> None:
+def test_attach_twice_raises(two_walls: GridMap, corridor: Heatmap) -> None:
     setup = make_setup(two_walls, "RRTstar")
     attachment = attach(setup, corridor)
     with pytest.raises(PlannerError, match="detach"):

@@ -57,18 +57,18 @@ def test_all_three_methods(corridor: Heatmap, sampler: Any) -> None:
         sampler.sampleGaussian(state, Fake(20, 20), 3.0)
         assert max(abs(state[0] - 20), abs(state[1] - 20)) <= 20
     sampler.sampleUniformNear(state, Fake(0, 0), 1e-6)
-    assert min(state.values) >= 0, "draws stay in the bounds of the space"
+    assert min(state.values) >= 0, "samples stay in the bounds of the space"
     assert sum(sampler.sample_counts.values()) == 701
 
 
 def test_same_seed_same_draws(two_walls: GridMap, corridor: Heatmap) -> None:
     space = compat.plane_space(*two_walls.bounds)
-    drawn = []
+    samples = []
     for _ in range(2):
         sampler, state = HeatmapStateSampler(space, corridor, seed=9), Fake()
         sampler.sampleUniform(state)
-        drawn.append(state.values)
-    assert drawn[0] == drawn[1]
+        samples.append(state.values)
+    assert samples[0] == samples[1]
 
 
 def test_bad_fraction(two_walls: GridMap, corridor: Heatmap) -> None:
@@ -80,10 +80,10 @@ def make_setup(grid: GridMap) -> Any:
     setup = og.SimpleSetup(compat.plane_space(*grid.bounds))
     si = setup.getSpaceInformation()
     setup.setStateValidityChecker(GridValidityChecker(si, grid))
-    ends = compat.new_state(setup.getStateSpace()), compat.new_state(setup.getStateSpace())
-    for end, point in zip(ends, (START, GOAL), strict=True):
-        end[0], end[1] = point
-    setup.setStartAndGoalStates(*ends, 2.0)
+    endpoints = compat.new_state(setup.getStateSpace()), compat.new_state(setup.getStateSpace())
+    for endpoint, point in zip(endpoints, (START, GOAL), strict=True):
+        endpoint[0], endpoint[1] = point
+    setup.setStartAndGoalStates(*endpoints, 2.0)
     return setup
 
 

@@ -279,6 +279,7 @@ def test_prm_and_iterations(two_walls: GridMap) -> None:
             plan(two_walls, START, GOAL, "PRM", "uniform", iterations=10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("planner", ["RRT", "InformedRRTstar", "PRM"])
 def test_memory_does_not_grow(planner: str) -> None:
     """1,000 plans in one process: less than 5 % of growth."""

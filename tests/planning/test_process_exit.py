@@ -17,7 +17,7 @@ assert result.sample_counts["learned"] > 0
 print("done")
 """
 
-# Everything is a module global and the link stays attached: the worst case for the bindings.
+# Everything is a module global and the attachment stays attached: the worst case for the bindings.
 ATTACH = """
 import numpy as np
 from cbagan_ompl.planning import compat
@@ -34,9 +34,9 @@ start[0], start[1], goal[0], goal[1] = 5.0, 5.0, 5.0, 35.0
 setup.setStartAndGoalStates(start, goal)
 planner = og.{planner}(si)
 setup.setPlanner(planner)
-link = cbagan_ompl.attach(setup, heatmap)
+attachment = cbagan_ompl.attach(setup, heatmap)
 setup.solve(0.2)
-assert link.sample_counts["learned"] > 0
+assert attachment.sample_counts["learned"] > 0
 print("done")
 """
 

@@ -81,7 +81,7 @@ def test_last_valid_state() -> None:
     assert last[1] == 5
 
 
-def test_curves_are_refused() -> None:
+def test_curves_raise() -> None:
     space = ob.DubinsStateSpace(2.0)
     setup = og.SimpleSetup(space)
     grid = random_grid({})

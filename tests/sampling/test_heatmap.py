@@ -28,9 +28,9 @@ def test_draws_follow_the_values(frame: dict[str, object]) -> None:
     np.add.at(counts, (rows, columns), 1)
     expected = heatmap.values.astype(float) / heatmap.values.sum() * len(points)
     assert (counts[expected == 0] == 0).all()
-    drawn = expected > 0
-    total = expected[drawn].sum()
-    assert chisquare(counts[drawn] * total / counts.sum(), expected[drawn]).pvalue > 1e-3
+    support = expected > 0
+    total = expected[support].sum()
+    assert chisquare(counts[support] * total / counts.sum(), expected[support]).pvalue > 1e-3
 
 
 def test_draws_are_uniform_inside_a_pixel() -> None:
@@ -100,21 +100,21 @@ def test_controls_know_the_task(two_walls: GridMap) -> None:
     assert corridor.region.sum() < 0.25 * two_walls.free.sum()
 
 
-def test_joined_bridges_a_broken_region(two_walls: GridMap, corridor: Heatmap) -> None:
+def test_connected_bridges_a_broken_region(two_walls: GridMap, corridor: Heatmap) -> None:
     values = corridor.values.copy()
     values[60:120] = 0
     values[:20] = 0
     broken = Heatmap(values, two_walls)
     assert not broken.connects(START, GOAL)
-    joined = broken.connected(START, GOAL)
-    assert joined.connects(START, GOAL)
-    assert (joined.values >= broken.values).all()
-    added = joined.region & ~broken.region
+    connected = broken.connected(START, GOAL)
+    assert connected.connects(START, GOAL)
+    assert (connected.values >= broken.values).all()
+    added = connected.region & ~broken.region
     assert 0 < added.sum() < 0.1 * two_walls.free.sum()
-    assert joined.connected(START, GOAL) is joined
+    assert connected.connected(START, GOAL) is connected
 
 
-def test_joined_refuses_separate_parts() -> None:
+def test_connected_raises_for_separate_parts() -> None:
     free = np.ones((9, 9), bool)
     free[:, 4] = False
     grid = GridMap(free)

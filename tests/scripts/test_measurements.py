@@ -17,6 +17,7 @@ def test_overhead() -> None:
     assert "iterations per second inside" in printed
 
 
+@pytest.mark.slow
 def test_startup_time() -> None:
     pytest.importorskip("torch")
     printed = run_script(SCRIPTS / "startup_time.py", str(ROOT), str(ROOT), "--runs", "1")
@@ -25,12 +26,14 @@ def test_startup_time() -> None:
     assert all(0.1 < float(row[-1]) < 10 for row in rows)
 
 
+@pytest.mark.slow
 def test_gallery(tmp_path: Path) -> None:
     pytest.importorskip("torch")
     run_script(SCRIPTS / "gallery.py", "--output", str(tmp_path / "regions.png"))
     assert cv2.imread(str(tmp_path / "regions.png")).std() > 10
 
 
+@pytest.mark.slow
 def test_training_speed() -> None:
     pytest.importorskip("torch")
     words = ("--batch-size", "1", "--size", "32", "--repeats", "1", "--device", "cpu")

@@ -42,6 +42,7 @@ def test_paper_suite(folder: Path, tmp_path: Path) -> None:
         assert heatmap.values[int(task.task.start[1]), int(task.task.start[0])] == 1
 
 
+@pytest.mark.slow
 def test_paper_tables(folder: Path, tmp_path: Path) -> None:
     pytest.importorskip("torch")
     from cbagan_ompl.inference.model_files import bundled_model

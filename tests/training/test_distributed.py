@@ -91,6 +91,7 @@ def test_too_few_tasks_for_the_processes() -> None:
         loop._batch_size(3, TINY, ProcessGroup(0, 4))
 
 
+@pytest.mark.slow
 def test_two_processes_have_the_gradients_of_one(folder: Path, tmp_path: Path) -> None:
     script = str(Path(__file__).parents[1] / "helpers" / "first_gradients.py")
     for processes in (1, 2):
@@ -102,6 +103,7 @@ def test_two_processes_have_the_gradients_of_one(folder: Path, tmp_path: Path) -
         torch.testing.assert_close(two[name], one[name], rtol=0, atol=1e-4 * scale, msg=name)
 
 
+@pytest.mark.slow
 def test_training_under_torchrun(folder: Path, tmp_path: Path) -> None:
     words = ["--epochs", "1", "--device", "cpu", "--set", "widths=[4,4,6,8]", "batch_size=4"]
     words += ["discriminator_width=4", "adversarial_every=1"]
@@ -112,6 +114,7 @@ def test_training_under_torchrun(folder: Path, tmp_path: Path) -> None:
     assert logs[1]["losses"] == pytest.approx(logs[0]["losses"], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_batches_that_cannot_be_divided(folder: Path, tmp_path: Path) -> None:
     words = ["train", str(folder), "--output", str(tmp_path / "run"), "--device", "cpu"]
     with pytest.raises(AssertionError, match="batches of 5 cannot be shared evenly by 2 processes"):

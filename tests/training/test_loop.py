@@ -91,6 +91,7 @@ def test_a_resumed_run_on_synthetic_maps_equals_an_uninterrupted_one(
         loop.train(source, TINY_PATCHES, tmp_path / "parts", resume=True, progress=False)
 
 
+@pytest.mark.slow
 def test_training_learns(source: DatasetSource, tmp_path: Path) -> None:
     # The region turns the same way in every task, so mirrored tasks would contradict each other.
     config = TINY.updated(

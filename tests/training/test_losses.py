@@ -62,7 +62,7 @@ def test_a_discriminator_that_is_right_has_the_lower_loss() -> None:
     assert losses.discriminator_loss(high, low) < losses.discriminator_loss(low, high)
 
 
-def test_adversarial_loss_wants_fakes_judged_real() -> None:
+def test_adversarial_loss_is_low_where_the_discriminator_takes_predictions_for_labels() -> None:
     assert losses.adversarial_loss(torch.tensor([1.0])).item() == pytest.approx(
         log(1 + exp(-1)), rel=1e-6
     )
