@@ -74,12 +74,13 @@ def read_record(path: Path) -> dict[str, Any]:
 
 
 def check_same(record: Mapping[str, Any], saved: Path) -> None:
-    """Raise unless a file holds the same record.
+    """Raise unless a file holds the same record; ``within`` may differ, it is of the report alone.
 
     Raises:
         ConfigError: it does not, or cannot be read; the message says what differs.
     """
-    differences = list(_differences(read_record(saved), record))
+    there, now = ({**of, "within": None} for of in (read_record(saved), record))
+    differences = list(_differences(there, now))
     if differences:
         shown = "; ".join(differences[:_SHOWN])
         more = f"; and {len(differences) - _SHOWN} more" if len(differences) > _SHOWN else ""

@@ -100,6 +100,7 @@ _INPUT_ARGUMENTS = (
     "path",
     "config",
     "inception",
+    "start_from",
 )
 
 # What a full or protected disk, and not a mistake of ours, is the cause of.

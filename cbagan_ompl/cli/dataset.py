@@ -7,13 +7,16 @@ from pathlib import Path
 from typing import Any
 
 from ..common.outputs import write_report
-from ..common.validation import check_at_least
+from ..common.validation import whole_number
 from ..datasets.generation import LABELS, RANGE, RUNS, GenerationSettings, generate
 from ..datasets.importing import KEEP, describe, import_dataset, write_dataset
 from ..datasets.splits import SPLITS
 from ..datasets.synthetic import HARD_DETOUR
 from ..errors import ConfigError
 from ..map_generators import MAP_GENERATORS
+
+# Processes that the pools of Python start, at most.
+_MAX_JOBS = 1024
 
 _HELP = """\
 Import and split a training set, generate a new one, or measure the noise of labels.
@@ -25,8 +28,12 @@ the CBAGAN-RRT paper.
 _IMPORT_HELP = """\
 Read a training set, check all of its files, and print what it holds.
 
-PATH is a folder or an archive (.tar.gz, .zip). With --output a copy is written, which can be split
-again: the paper's set is split by task, so that every test map is in training too;
+PATH is a folder or an archive: .zip, or .tar, perhaps in gzip, bzip2 or xz. Only lists and images
+are unpacked; archives with links, of more than 131,072 members or 2 GiB, or that grow to more than
+200 times their size are refused: unpack them yourself, where you trust them.
+
+With --output a copy is written, which can be split again: the paper's set is split by task, so that
+every test map is in training too;
 
   cbagan-ompl dataset import mpr.tar.gz --output mpr-by-map --split map --copies 10
 
@@ -216,7 +223,7 @@ def _generate(args: argparse.Namespace) -> int:
         test_fraction=args.test_fraction,
         seed=args.seed,
     )
-    check_at_least("jobs", args.jobs, 1)
+    whole_number("jobs", args.jobs, 1, _MAX_JOBS)
     generate(Path(args.output), settings, args.jobs, args.resume)
     print(f"{settings.maps * settings.tasks} tasks written to {args.output}")
     if args.json is not None:
@@ -227,7 +234,7 @@ def _generate(args: argparse.Namespace) -> int:
 def _noise(args: argparse.Namespace) -> int:
     from ..evaluation.label_noise import choose_tasks, label_noise
 
-    check_at_least("jobs", args.jobs, 1)
+    whole_number("jobs", args.jobs, 1, _MAX_JOBS)
     tasks = import_dataset(Path(args.dataset)).test
     if args.tasks is not None:
         tasks = choose_tasks(tasks, args.tasks, args.seed)

@@ -47,6 +47,40 @@ def fork_server(preload: Sequence[str] = ()) -> ForkServerContext:
     return context
 
 
+def prepare_worker() -> None:
+    """Let SIGTERM end this process at work, but not while it sends a result: an initializer.
+
+    Of half a result the process that reads it would wait for the rest without end.
+    """
+    signal.signal(signal.SIGTERM, _end_unless_sending)
+
+
+def run_call(work: Callable[..., T], *arguments: Any) -> T:
+    """Return the result of a call in a process that :func:`prepare_worker` has prepared."""
+    _state.is_working = True
+    if _state.is_ending:
+        os._exit(1)
+    try:
+        return work(*arguments)
+    finally:
+        _state.is_working = False
+
+
+class _WorkerState:
+    """What the signal handler of a worker process needs to know."""
+
+    is_working = is_ending = False
+
+
+_state = _WorkerState()
+
+
+def _end_unless_sending(*_: object) -> None:
+    _state.is_ending = True
+    if _state.is_working:
+        os._exit(1)
+
+
 def start_first(process: BaseProcess, interrupted: Connection) -> None:
     """Start the first process of a server, without waiting for the server after an interrupt.
 
@@ -107,10 +141,12 @@ def run_all(
     others = set(active_children())
     with interrupts_held():
         context = fork_server()
-    with ProcessPoolExecutor(processes, context) as pool:
+    with ProcessPoolExecutor(processes, context, prepare_worker) as pool:
         try:
             with interrupts_held():  # submitting starts the processes
-                positions = {pool.submit(work, *args): i for i, args in enumerate(arguments)}
+                positions = {
+                    pool.submit(run_call, work, *args): i for i, args in enumerate(arguments)
+                }
             done = as_completed(positions)
             for future in tqdm(done, total=len(positions), unit=f" {unit}", disable=not progress):
                 results[positions[future]] = future.result()

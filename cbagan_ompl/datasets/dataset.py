@@ -18,26 +18,37 @@ All images are squares of one size. They are held in memory as bytes, 80 MB for 
 
 from __future__ import annotations
 
-import csv
-import io
 import re
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.files import read_bytes, read_text
-from ..errors import DatasetError
+from ..common.files import read_bytes
+from ..errors import CbaganOmplError, DatasetError, show
+from ..maps.image_files import MAX_IMAGE_BYTES, decode_pixels
+from .tables import read_table
 
 #: Columns of ``train.csv`` and ``test.csv``.
 COLUMNS = ("map", "task", "roi")
 
+#: Longest side of the images of a set, and most pixels of all images of a kind together.
+MAX_SIZE, MAX_PIXELS = 4096, 2**32
+
 # Values of a colour channel below this count as dark.
 _DARK = 128
+
+
+class Row(NamedTuple):
+    """The names of a task's files."""
+
+    map: str
+    task: str
+    roi: str
 
 
 @dataclass(frozen=True)
@@ -146,7 +157,7 @@ def load_dataset(folder: str | PathLike[str]) -> Dataset:
     if not root.is_dir():
         raise DatasetError(f"{root}: no such folder; give the folder that holds train.csv")
     rows = {name: _read_rows(root / f"{name}.csv") for name in ("train", "test")}
-    names = sorted({row["map"] for part in rows.values() for row in part}, key=_map_number)
+    names = sorted({row.map for part in rows.values() for row in part}, key=_map_number)
     maps = _read_maps(root, names)
     index = {name: i for i, name in enumerate(names)}
     parts = {name: _read_tasks(root, part, maps, index) for name, part in rows.items()}
@@ -166,92 +177,98 @@ def label_files(folder: str | PathLike[str], part: str) -> list[Path]:
     """
     root = Path(folder)
     return [
-        root / "tasks" / Path(row["map"]).stem / row["roi"]
-        for row in _read_rows(root / f"{part}.csv")
+        root / "tasks" / Path(row.map).stem / row.roi for row in _read_rows(root / f"{part}.csv")
     ]
 
 
 def _map_number(name: str) -> tuple[int, str]:
     """Return K of ``map_K.png``, or -1, and the name itself as a key to sort by."""
-    match = re.fullmatch(r"map_(\d+)", Path(name).stem)
+    match = re.fullmatch(r"map_(\d{1,18})(\.[^.]*)?", name)
     return int(match[1]) if match else -1, name
 
 
-def _read_rows(path: Path) -> list[dict[str, str]]:
-    text = read_text(path, DatasetError)
-    try:
-        reader = csv.DictReader(io.StringIO(text, newline=""))
-        missing = set(COLUMNS) - set(reader.fieldnames or ())
-        rows = list(reader)
-    except csv.Error as error:
-        raise DatasetError(f"{path}: cannot read the list of tasks ({error})") from error
-    if missing:
-        raise DatasetError(
-            f"{path}: column {', '.join(sorted(missing))} is missing; "
-            f"the columns are {', '.join(COLUMNS)}"
-        )
-    if not rows or any(not row[column] for row in rows for column in COLUMNS):
-        raise DatasetError(f"{path}: the list is empty, or a line has an empty or missing cell")
+def _read_rows(path: Path) -> list[Row]:
+    rows = [Row(*cells) for cells in read_table(path, COLUMNS)]
+    if not rows:
+        raise DatasetError(f"{path}: the list is empty")
     for row in rows:
-        for column in COLUMNS:
-            if Path(row[column]).name != row[column]:
-                raise DatasetError(f"{path}: {row[column]!r} is no name of a file without folders")
+        for name in row:
+            if "/" in name or name == "." or name.startswith(".."):
+                raise DatasetError(f"{path}: {show(name)} is no name of a file without folders")
     return rows
 
 
 def _read_maps(root: Path, names: list[str]) -> NDArray[np.uint8]:
-    images = [read_image(root / "maps" / name) for name in names]
-    size = images[0].shape[0]
-    if images[0].shape[1] != size:
+    first = read_image(root / "maps" / names[0])
+    size = len(first)
+    if first.shape[1] != size:
         raise DatasetError(
             f"{root}: the images of a training set are squares; {names[0]} has "
-            f"{images[0].shape[1]} x {size} pixels"
+            f"{first.shape[1]} x {size} pixels"
         )
-    for name, image in zip(names, images, strict=True):
-        _check_size(root / "maps" / name, image, size)
-    return np.stack([(image[..., 0] >= _DARK).astype(np.uint8) for image in images])
+    check_pixels(len(names), size, str(root))
+    maps = np.empty((len(names), size, size), dtype=np.uint8)
+    for i, name in enumerate(names):
+        maps[i] = read_image(root / "maps" / name, size)[..., 0] >= _DARK
+    return maps
 
 
 def _read_tasks(
-    root: Path, rows: list[dict[str, str]], maps: NDArray[np.uint8], map_index: dict[str, int]
+    root: Path, rows: list[Row], maps: NDArray[np.uint8], map_index: dict[str, int]
 ) -> Tasks:
     size = maps.shape[-1]
+    check_pixels(len(rows), size, str(root))
     endpoints = np.empty((len(rows), 2, 2), dtype=np.float32)
     region = np.empty((len(rows), size, size), dtype=np.uint8)
     for i, row in enumerate(rows):
-        folder = root / "tasks" / Path(row["map"]).stem
-        image = read_image(folder / row["task"])
-        _check_size(folder / row["task"], image, size)
-        endpoints[i] = _find_endpoints(folder / row["task"], image)
-        image = read_image(folder / row["roi"])
-        _check_size(folder / row["roi"], image, size)
+        folder = root / "tasks" / Path(row.map).stem
+        endpoints[i] = _find_endpoints(folder / row.task, read_image(folder / row.task, size))
+        image = read_image(folder / row.roi, size)
         region[i] = (image[..., 1] >= _DARK) & (image[..., 0] < _DARK)
-    map_of = np.array([map_index[row["map"]] for row in rows], dtype=np.int64)
+    map_of = np.array([map_index[row.map] for row in rows], dtype=np.int64)
     return Tasks(maps, map_of, endpoints[:, 0].copy(), endpoints[:, 1].copy(), region)
 
 
-def read_image(path: Path) -> NDArray[np.uint8]:
-    """Read an image as (H, W, 3), red, green, blue.
+def read_image(path: Path, size: int | None = None) -> NDArray[np.uint8]:
+    """Read an image as (H, W, 3), red, green, blue, each from 0 to 255.
+
+    Args:
+        path: of the file.
+        size: width and height that it must have; None for any.
 
     Raises:
-        DatasetError: it is missing, no image, or too large.
+        DatasetError: it is missing, no image, of another size, or longer on a side than
+            :data:`MAX_SIZE`, which is found out before memory is spent on it.
     """
-    # cv2.imread itself would print a warning for a missing file, and cannot open every path.
-    data = np.frombuffer(read_bytes(path, DatasetError), dtype=np.uint8)
-    try:
-        image = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
-    except cv2.error as error:
-        raise DatasetError(f"{path}: an image that is too large ({error.err})") from error
-    if image is None:
-        raise DatasetError(f"{path}: not an image, or a damaged one")
-    return np.asarray(image[..., ::-1], dtype=np.uint8)
+    data = read_bytes(path, DatasetError, limit=MAX_IMAGE_BYTES)
+    expected = None if size is None else (size, size)
+    pixels: Any
+    pixels, white = decode_pixels(data, str(path), DatasetError, expected, MAX_SIZE)
+    if white != 255:
+        pixels = cv2.convertScaleAbs(pixels, alpha=255 / white)
+    if pixels.ndim == 2:
+        pixels = np.broadcast_to(pixels[..., None], (*pixels.shape, 3))
+    return np.asarray(pixels[..., 2::-1], dtype=np.uint8)
 
 
-def _check_size(path: Path, image: NDArray[np.uint8], size: int) -> None:
-    if image.shape[:2] != (size, size):
-        raise DatasetError(
-            f"{path}: {image.shape[1]} x {image.shape[0]} pixels, "
-            f"but the first map has {size} x {size}"
+def check_pixels(
+    count: int, size: int, name: str, error_class: type[CbaganOmplError] = DatasetError
+) -> None:
+    """Raise if images do not fit into memory together.
+
+    Args:
+        count: number of the images.
+        size: width and height of each in pixels.
+        name: what to call them in the message.
+        error_class: what to raise.
+
+    Raises:
+        CbaganOmplError: of that class; they have more than :data:`MAX_PIXELS` pixels.
+    """
+    if count * size * size > MAX_PIXELS:
+        raise error_class(
+            f"{name}: {count} images of {size} x {size} pixels; a set holds up to "
+            f"{MAX_PIXELS} pixels, which are kept in memory"
         )
 
 

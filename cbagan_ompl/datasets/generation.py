@@ -7,6 +7,7 @@ the same whatever the number of processes and of interruptions, with one version
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -16,18 +17,25 @@ from numpy.typing import NDArray
 
 from ..common.files import make_folder, read_text, write_json
 from ..common.parallel import run_all
-from ..common.validation import check_at_least, check_fraction, require
-from ..errors import ConfigError, DatasetError
+from ..common.validation import (
+    check_fraction,
+    finite_number,
+    positive_number,
+    require,
+    whole_number,
+)
+from ..errors import ConfigError, DatasetError, show
 from ..map_generators import MAP_GENERATORS, MIN_SIZE, check_generators
 from ..map_generators.randomization import randomized_map
 from ..maps.grid_map import GridMap
 from ..sampling.heatmap import REGION_THRESHOLD, pixel_pair
 from .augmentation import augment
-from .dataset import Tasks
+from .dataset import MAX_SIZE, Tasks, check_pixels
 from .geodesic_labels import geodesic_label
 from .splits import select_test_tasks
 from .synthetic import HARD_DETOUR
-from .writing import Row, task_row, write_lists, write_map, write_tasks
+from .tables import MAX_LINES
+from .writing import check_new_folder, task_row, write_lists, write_map, write_tasks
 
 #: File in the folder of a generated set that records its settings.
 RECORD = "dataset.json"
@@ -41,6 +49,9 @@ ITERATIONS = 5000
 #: Longest edge of RRT as a fraction of the map's size, one pixel at 64. Of the lengths tried (1/128
 #: to 12/64) the short ones give labels like the published ones; half of it is twice as slow.
 RANGE = 1 / 64
+
+# Largest record in bytes.
+_MAX_RECORD = 2**20
 
 # Attempts to find a task on a map, and those of them that look for a hard one.
 _MAX_ATTEMPTS, _MAX_HARD_ATTEMPTS = 1000, 100
@@ -96,19 +107,24 @@ class GenerationSettings:
 
     def __post_init__(self) -> None:
         for name in ("maps", "tasks", "copies", "runs"):
-            check_at_least(name, getattr(self, name), 1)
-        check_at_least("size", self.size, MIN_SIZE)
+            whole_number(name, getattr(self, name), 1, MAX_LINES)
+        whole_number("size", self.size, MIN_SIZE, MAX_SIZE)
         check_generators(self.generators)
         if self.label not in LABELS:
-            raise ConfigError(f"a label is one of {', '.join(LABELS)}, got {self.label!r}")
-        check_fraction("hard_fraction", self.hard_fraction)
-        if self.range is not None and not 0 < self.range < float("inf"):
-            raise ConfigError(f"range must be above 0, got {self.range}")
-        if not 0 <= self.min_distance < 1:
+            raise ConfigError(f"a label is one of {', '.join(LABELS)}, got {show(self.label)}")
+        check_fraction("hard_fraction", finite_number("hard_fraction", self.hard_fraction, 0))
+        if self.range is not None:
+            positive_number("range", self.range)
+        if not finite_number("min_distance", self.min_distance, 0) < 1:
             raise ConfigError(
                 f"min_distance is a fraction of the map's size, from 0 to below 1, "
-                f"got {self.min_distance}"
+                f"got {show(self.min_distance)}"
             )
+        if self.maps * self.tasks > MAX_LINES:
+            raise ConfigError(
+                f"a set holds up to {MAX_LINES} tasks, {self.maps * self.tasks} are asked for"
+            )
+        check_pixels(self.maps * self.tasks, self.size, "the set", ConfigError)
         # Raises for an impossible seed or split before any work is done.
         self.select_test_tasks()
 
@@ -141,7 +157,8 @@ def generate(
         progress: show a progress bar.
 
     Raises:
-        ConfigError: ``resume`` with other settings, or without it although the folder holds a set.
+        ConfigError: ``resume`` with other settings, or without it although the folder holds a
+            set; or files that are no part of such a set are in its place.
         MissingDependencyError: geodesic distances are needed, and numba is not installed.
         DatasetError: a file cannot be written, or a map has no task of the wanted distance.
     """
@@ -150,7 +167,7 @@ def generate(
     _prepare_folder(folder, settings, resume)
     missing = [k for k in range(settings.maps) if not _task_list(folder, k).is_file()]
     run_all(_write_map_and_tasks, [(folder, settings, k) for k in missing], jobs, "maps", progress)
-    rows: list[Row] = [task_row(k, n) for k in range(settings.maps) for n in range(settings.tasks)]
+    rows = [task_row(k, n) for k in range(settings.maps) for n in range(settings.tasks)]
     write_lists(folder, rows, settings.select_test_tasks())
 
 
@@ -163,7 +180,7 @@ def _prepare_folder(folder: Path, settings: GenerationSettings, resume: bool) ->
 
     record = folder / RECORD
     made_by = json.loads(json.dumps({"settings": asdict(settings), "ompl": ompl_version()}))
-    if record.exists():
+    if os.path.lexists(record):
         if not resume:
             raise ConfigError(
                 f"{folder} holds a set already; go on with it (--resume), or choose another folder"
@@ -173,14 +190,16 @@ def _prepare_folder(folder: Path, settings: GenerationSettings, resume: bool) ->
                 f"{record} was written with other options or another OMPL; go on with the same"
             )
         return
+    check_new_folder(folder)
     make_folder(folder, DatasetError)
     write_json(record, made_by)
 
 
 def _read_record(path: Path) -> Any:
+    text = read_text(path, DatasetError, _MAX_RECORD)
     try:
-        return json.loads(read_text(path, DatasetError))
-    except ValueError as error:
+        return json.loads(text)
+    except Exception as error:  # ValueError, and RecursionError where it is nested deeply
         raise DatasetError(f"{path}: cannot read how the set was made ({error})") from error
 
 

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import platform
-import tarfile
-import zipfile
-import zlib
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -14,33 +10,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.files import reason
-from ..common.validation import check_at_least
+from ..common.validation import whole_number
 from ..errors import ConfigError, DatasetError
 from ..maps.connectivity import connects
+from .archives import unpack
 from .dataset import Dataset, Tasks, load_dataset
 from .splits import select_test_tasks
-from .writing import task_row, write_lists, write_map, write_tasks
+from .writing import check_new_folder, task_row, write_lists, write_map, write_tasks
 
 #: The split that leaves the lists of a set as they are.
 KEEP = "keep"
-
-# What damaged or encrypted archives raise; ``zipfile`` has no root for its own.
-_UNREADABLE = (
-    OSError,
-    EOFError,
-    tarfile.TarError,
-    zipfile.BadZipFile,
-    zlib.error,
-    RuntimeError,
-    ValueError,
-)
 
 
 def import_dataset(path: Path) -> Dataset:
     """Read the set in a folder, or in an archive that holds it in any of its folders.
 
     Args:
-        path: of the folder, or of the archive (.tar, .tar.gz, .zip).
+        path: of the folder, or of the archive, see :func:`.archives.unpack`.
 
     Raises:
         DatasetError: it cannot be read, see :func:`cbagan_ompl.datasets.dataset.load_dataset`, or
@@ -48,10 +34,14 @@ def import_dataset(path: Path) -> Dataset:
     """
     if path.is_dir():
         return load_dataset(path)
-    with TemporaryDirectory() as temporary:
+    try:
+        unpacked = TemporaryDirectory(ignore_cleanup_errors=True)
+    except OSError as error:
+        raise DatasetError(f"cannot make a folder to unpack {path}: {reason(error)}") from error
+    with unpacked as temporary:
         # A set without a folder in the archive takes the archive's name.
         folder = Path(temporary) / path.name.split(".")[0]
-        _unpack(path, folder)
+        unpack(path, folder)
         lists = list(folder.rglob("train.csv"))
         if len(lists) != 1:
             raise DatasetError(
@@ -62,26 +52,6 @@ def import_dataset(path: Path) -> Dataset:
         except DatasetError as error:
             message = str(error).replace(f"{folder}/", "")
             raise DatasetError(f"{path}: {message}") from error
-
-
-def _unpack(path: Path, folder: Path) -> None:
-    try:
-        if zipfile.is_zipfile(path):
-            with zipfile.ZipFile(path) as zipped:
-                zipped.extractall(folder)  # never writes outside the folder
-            return
-        with tarfile.open(path) as archive:
-            if not hasattr(tarfile, "data_filter"):
-                raise DatasetError(
-                    f"{path}: Python {platform.python_version()} cannot keep a tar archive from "
-                    "writing outside its folder (3.10.12, 3.11.4 and newer can); unpack it "
-                    "yourself, and give the folder"
-                )
-            archive.extractall(folder, filter="data")
-    except _UNREADABLE as error:
-        raise DatasetError(
-            f"{path}: neither a folder nor an archive that can be unpacked ({reason(error)})"
-        ) from error
 
 
 def describe(dataset: Dataset) -> dict[str, Any]:
@@ -146,7 +116,7 @@ def write_dataset(
     where not all are called ``map_K.png``, or two have the same number.
 
     Args:
-        folder: of the new set; must not hold a set yet.
+        folder: of the new set; must hold nothing yet that a set would replace.
         dataset: the set.
         split: ``keep`` for the lists as they are, or see
             :func:`cbagan_ompl.datasets.splits.select_test_tasks`.
@@ -156,12 +126,11 @@ def write_dataset(
         seed: of the split.
 
     Raises:
-        ConfigError: the folder holds a set, or the split cannot be made.
+        ConfigError: the folder holds a set or such files, or the split cannot be made.
         DatasetError: a file cannot be written.
     """
-    if (folder / "train.csv").exists():
-        raise ConfigError(f"{folder} holds a set already; choose another folder")
-    check_at_least("copies", copies, 1)
+    check_new_folder(folder)
+    whole_number("copies", copies, 1)
     tasks, was_test = _concatenate_parts(dataset)
     order = np.argsort(tasks.map_of, kind="stable")
     tasks, was_test = tasks.select(order), was_test[order]

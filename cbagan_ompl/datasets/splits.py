@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.validation import check_at_least
-from ..errors import ConfigError
+from ..common.validation import finite_number, whole_number
+from ..errors import ConfigError, show
 
 #: Kinds of splits, see :func:`select_test_tasks`.
 SPLITS = ("task", "map")
@@ -38,10 +38,10 @@ def select_test_tasks(
         np.int64(2)
     """
     if split not in SPLITS:
-        raise ConfigError(f"a split is one of {', '.join(SPLITS)}, got {split!r}")
-    if not 0 < fraction < 1:
+        raise ConfigError(f"a split is one of {', '.join(SPLITS)}, got {show(split)}")
+    if not 0 < finite_number("test_fraction", fraction, 0) < 1:
         raise ConfigError(f"the fraction of test tasks is between 0 and 1, got {fraction}")
-    check_at_least("seed", seed, 0)
+    whole_number("seed", seed, 0)
     units = np.arange(len(originals)) if split == "task" else originals
     different = np.unique(units)
     if len(different) < 2:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -12,14 +13,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.files import make_folder, write_atomically
-from ..errors import DatasetError
-from .dataset import COLUMNS, Tasks
+from ..errors import ConfigError, DatasetError
+from .dataset import COLUMNS, Row, Tasks
 
 #: Columns of ``tasks/map_K.csv``: row and column of start and goal, and their distance in pixels.
 TASK_COLUMNS = ("istart", "jstart", "igoal", "jgoal", "euclid")
 
-#: Names of a task's files: map, task, region.
-Row = tuple[str, str, str]
+
+# What the folder of a set holds.
+_NAMES = ("maps", "tasks", "train.csv", "test.csv", "dataset.json")
+
+
+def check_new_folder(folder: Path) -> None:
+    """Raise if a set in a folder would replace files that are there.
+
+    Args:
+        folder: of the new set; may be missing.
+
+    Raises:
+        ConfigError: one of the names that a set uses is there already.
+    """
+    for name in _NAMES:
+        if os.path.lexists(folder / name):
+            raise ConfigError(
+                f"{folder} holds a set already, or other files that a set would replace ({name}); "
+                "choose another folder"
+            )
 
 
 def write_map(root: Path, number: int, free: NDArray[np.bool_ | np.uint8]) -> None:
@@ -67,9 +86,9 @@ def task_row(map_number: int, task: int) -> Row:
 
     Example:
         >>> task_row(3, 0)
-        ('map_3.png', 'task_0.png', 'task_0_roi.png')
+        Row(map='map_3.png', task='task_0.png', roi='task_0_roi.png')
     """
-    return f"map_{map_number}.png", f"task_{task}.png", f"task_{task}_roi.png"
+    return Row(f"map_{map_number}.png", f"task_{task}.png", f"task_{task}_roi.png")
 
 
 def write_lists(root: Path, rows: Sequence[Row], is_test: NDArray[np.bool_]) -> None:

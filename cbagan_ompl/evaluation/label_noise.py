@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.parallel import run_all
-from ..common.validation import check_at_least
+from ..common.validation import positive_number, whole_number
 from ..datasets.dataset import Tasks
 from ..datasets.generation import ITERATIONS
 from ..errors import ConfigError
@@ -30,9 +30,9 @@ def choose_tasks(tasks: Tasks, count: int, seed: int) -> Tasks:
     Raises:
         ConfigError: there are fewer tasks, or the seed is negative.
     """
-    if not 1 <= count <= len(tasks):
+    if whole_number("tasks", count, 1) > len(tasks):
         raise ConfigError(f"tasks must be from 1 to {len(tasks)}, got {count}")
-    check_at_least("seed", seed, 0)
+    whole_number("seed", seed, 0)
     chosen = np.random.default_rng(seed).choice(len(tasks), count, replace=False)
     return tasks.select(np.sort(chosen))
 
@@ -67,9 +67,9 @@ def label_noise(
         ConfigError: an argument out of range.
         TaskError: a task whose start or goal is blocked, or which has no path.
     """
-    if runs < 1 or not 0 < range < float("inf"):
-        raise ConfigError(f"runs and range must be positive, got {runs} and {range}")
-    check_at_least("seed", seed, 0)
+    whole_number("runs", runs, 1)
+    positive_number("range", range)
+    whole_number("seed", seed, 0)
     free = tasks.free
     arguments = [
         (free[i], tasks.start[i], tasks.goal[i], runs, range, (seed, i))

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.files import read_text
-from ..datasets.dataset import label_files, read_image
+from ..datasets.dataset import check_pixels, label_files, read_image
+from ..datasets.tables import read_table
 from ..errors import DatasetError
 
 # The list that a folder of predictions may have; its columns name label and prediction.
@@ -32,19 +30,27 @@ def load_predictions(folder: Path, dataset: Path, part: str) -> NDArray[np.bool_
         (N, S, S), true in the region, in the order of the tasks.
 
     Raises:
-        DatasetError: a prediction is missing, no image, or of another size than the others.
+        DatasetError: a prediction is missing, no image, no square, or of another size than the
+            others; or the list of them cannot be read.
     """
     files = _find_images(folder)
-    regions = []
-    for label in label_files(dataset, part):
+    labels = label_files(dataset, part)
+    regions: NDArray[np.bool_] | None = None
+    for i, label in enumerate(labels):
         name = f"{label.parent.name}/{label.name}"
         if name not in files:
             raise DatasetError(f"{folder}: there is no prediction for {name}")
+        image = read_image(files[name], None if regions is None else regions.shape[1])
+        if regions is None:
+            height, width = image.shape[:2]
+            if height != width:
+                raise DatasetError(f"{files[name]}: {width} x {height} pixels are no square")
+            check_pixels(len(labels), width, str(folder))
+            regions = np.empty((len(labels), height, width), np.bool_)
         # Red and blue are 255 in white and 0 in green; the threshold is half way between.
-        regions.append(read_image(files[name])[..., ::2].mean(axis=-1) < 127.5)
-        if regions[-1].shape != regions[0].shape:
-            raise DatasetError(f"{files[name]}: differs in size from the predictions before it")
-    return np.stack(regions)
+        regions[i] = image[..., ::2].mean(axis=-1) < 127.5
+    assert regions is not None, "the lists of a set are not empty"
+    return regions
 
 
 def _find_images(folder: Path) -> dict[str, Path]:
@@ -52,15 +58,7 @@ def _find_images(folder: Path) -> dict[str, Path]:
     table = folder / _LIST
     if not table.is_file():
         return {f"{path.parent.name}/{path.name}": path for path in folder.rglob("*.png")}
-    text = read_text(table, DatasetError)
-    try:
-        return {
-            "/".join(Path(row[_COLUMNS[0]]).parts[-2:]): folder / Path(row[_COLUMNS[1]]).name
-            for row in csv.DictReader(io.StringIO(text, newline=""))
-        }
-    # Missing columns are a KeyError, rows that are too short a TypeError.
-    except (csv.Error, KeyError, TypeError) as error:
-        raise DatasetError(
-            f"{table}: cannot read the list of predictions, its columns are "
-            f"{', '.join(_COLUMNS)} ({type(error).__name__})"
-        ) from error
+    return {
+        "/".join(Path(label).parts[-2:]): folder / Path(prediction).name
+        for label, prediction in read_table(table, _COLUMNS)
+    }

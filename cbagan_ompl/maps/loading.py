@@ -16,7 +16,7 @@ import numpy as np
 
 from ..common.files import read_bytes
 from ..errors import ConfigError, MapError, show
-from .image_files import SUFFIXES, decode_image
+from .image_files import MAX_IMAGE_BYTES, SUFFIXES, decode_image
 from .movingai import read_movingai_map
 from .raw_map import RawMap
 from .ros import read_ros_map
@@ -77,7 +77,9 @@ def read_map(path: str | os.PathLike[str], **options: Any) -> RawMap:
     file = Path(path)
     suffix = file.suffix.lower()
     if suffix in SUFFIXES:
-        return _read_image_map(read_bytes(file), str(file), file.stem, settings)
+        return _read_image_map(
+            read_bytes(file, limit=MAX_IMAGE_BYTES), str(file), file.stem, settings
+        )
     if suffix in (".yaml", ".yml"):
         return read_ros_map(file, unknown_is_free=settings.unknown_is_free)
     if suffix == ".map":
@@ -114,8 +116,9 @@ def _read_bundled(name: str, settings: MapOptions) -> RawMap:
 
 
 def _read_image_map(data: bytes, location: str, name: str, settings: MapOptions) -> RawMap:
-    gray, white, opaque = decode_image(data, location)
-    free = (np.arange(white + 1) / white >= settings.threshold)[gray]
+    image = decode_image(data, location)
+    white, opaque = image.white, image.opaque
+    free = image.look_up(np.arange(white + 1) / white >= settings.threshold)
     if opaque is not None:
         free = free | ~opaque if settings.unknown_is_free else free & opaque
     if not free.any():

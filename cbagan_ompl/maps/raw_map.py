@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..common.validation import is_finite_number
-from ..errors import MapError, show
+from ..errors import CbaganOmplError, MapError, show
 from .frames import Origin
 
 #: Longest side and largest area of a map, in pixels. Larger files are an error before memory is
@@ -39,20 +39,29 @@ class RawMap:
     unknown: NDArray[np.bool_] | None = None
 
 
-def check_map_size(width: int, height: int, name: str) -> None:
-    """Raise if a map is too large to plan on.
+def check_map_size(
+    width: int,
+    height: int,
+    name: str,
+    error_class: type[CbaganOmplError] = MapError,
+    longest: int = MAX_SIDE,
+) -> None:
+    """Raise if a map, or another image, is too large to work with.
 
     Args:
         width: columns, in pixels.
         height: rows, in pixels.
         name: what to call the map in the message.
+        error_class: what to raise.
+        longest: side in pixels that is allowed.
 
     Raises:
-        MapError: more than :data:`MAX_SIDE` pixels a side or :data:`MAX_PIXELS` in all.
+        CbaganOmplError: of that class; it has more pixels a side, or more than
+            :data:`MAX_PIXELS` in all.
     """
-    if max(width, height) > MAX_SIDE or width * height > MAX_PIXELS:
-        raise MapError(
-            f"{name}: {width} x {height} pixels; maps up to {MAX_SIDE} pixels a side and "
+    if max(width, height) > longest or width * height > MAX_PIXELS:
+        raise error_class(
+            f"{name}: {width} x {height} pixels; maps up to {longest} pixels a side and "
             f"{MAX_PIXELS} pixels in all are supported, scale it down first"
         )
 

@@ -23,12 +23,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..common.files import read_bytes
 from ..common.yaml_text import MAX_YAML_BYTES, parse_yaml
 from ..errors import MapError, show
-from .image_files import DecodedImage, decode_image
+from .image_files import MAX_IMAGE_BYTES, DecodedImage, decode_image
 from .raw_map import RawMap
 
 _REQUIRED = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
@@ -117,7 +116,7 @@ class _Description:
             raise self.error("image", "must be the path of an image, relative to this file")
         path = self.path.parent / Path(file).expanduser()
         try:
-            return decode_image(read_bytes(path), str(path))
+            return decode_image(read_bytes(path, limit=MAX_IMAGE_BYTES), str(path))
         except MapError as error:
             raise self.error("image", str(error)) from error
 
@@ -135,7 +134,8 @@ def read_ros_map(path: Path, *, unknown_is_free: bool) -> RawMap:
     description = _Description(path)
     resolution, origin, mode = description.resolution, description.origin, description.mode
     (free_thresh, occupied_thresh), negate = description.thresholds, description.negate
-    gray, white, opaque = description.image
+    image = description.image
+    white, opaque = image.white, image.opaque
 
     # Decided for each gray level first: that is quick, and leaves 0.2 equal to (255 - 204) / 255.
     levels = np.arange(white + 1)
@@ -147,10 +147,10 @@ def read_ros_map(path: Path, *, unknown_is_free: bool) -> RawMap:
         level_is_free = (occupancy < occupied_thresh) | (occupancy > 1)
     else:
         level_is_free = occupancy <= free_thresh
-    free: NDArray[np.bool_] = level_is_free[gray]
+    free = image.look_up(level_is_free)
     # What lies between the thresholds is partly occupied in scale mode, not unknown.
     between = (occupancy > free_thresh) & (occupancy < occupied_thresh) & (mode != "scale")
-    unknown: NDArray[np.bool_] = (between | (occupancy > 1))[gray]
+    unknown = image.look_up(between | (occupancy > 1))
     if opaque is not None:
         free = free | ~opaque if unknown_is_free else free & opaque
         unknown = unknown | ~opaque

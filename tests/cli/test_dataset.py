@@ -1,12 +1,14 @@
 from __future__ import annotations
 
 import json
+import signal
 import tarfile
+import time
 from pathlib import Path
 
 import pytest
-from helpers.interrupting import interrupted
-from helpers.training_set import generate_small_set, write_training_set
+from helpers.interrupting import ended, interrupted
+from helpers.training_set import assert_same_files, generate_small_set, write_training_set
 
 from cbagan_ompl.cli import main
 
@@ -33,8 +35,8 @@ def test_generate_import_and_noise_commands(
     assert json.loads(report.read_text())["tasks"] == 1
     for more, message in (
         (("--tasks", "7"), "from 1 to 1, got 7"),
-        (("--tasks", "1", "--seed", "-1"), "seed must be at least 0, got -1"),
-        (("--runs", "0"), "runs and range must be positive, got 0"),
+        (("--tasks", "1", "--seed", "-1"), "seed is a whole number of at least 0, got -1"),
+        (("--runs", "0"), "runs is a whole number of at least 1, got 0"),
         (("--json", str(tmp_path / "none" / "x.json")), "its folder does not exist"),
     ):
         assert main([*words, *more]) == 2
@@ -58,7 +60,7 @@ def test_a_split_needs_a_copy(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert main(words) == 2
     assert "give --output as well" in capsys.readouterr().err
     assert main([*words, "--output", str(tmp_path / "copy"), "--seed", "-1"]) == 2
-    assert "seed must be at least 0, got -1" in capsys.readouterr().err
+    assert "seed is a whole number of at least 0, got -1" in capsys.readouterr().err
     assert not (tmp_path / "copy").exists()
 
 
@@ -69,4 +71,39 @@ def test_an_interrupt_says_how_to_continue(tmp_path: Path) -> None:
     status, said = interrupted(words, lambda: any(tmp_path.glob("tasks/*.csv")))
     assert status == 130, said
     assert "--resume" in said
+    assert "Traceback" not in said
+
+
+@pytest.mark.usefixtures("interruptible")
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize("jobs", ["1", "3"])
+def test_signals_leave_no_process_of_generate_which_goes_on(
+    tmp_path: Path, number: int, status: int, jobs: str
+) -> None:
+    words = ["dataset", "generate", "--maps", "12", "--tasks", "2", "--generators", "blocks"]
+    words += ["--runs", "25", "--jobs", jobs, "--output"]
+    root = tmp_path / "set"
+    ended_with, said = ended([*words, str(root)], lambda: any(root.glob("tasks/*.csv")), number)
+    assert ended_with == status, said
+    assert said.splitlines()[-1].endswith("go on with the same command and --resume"), said
+    assert "Traceback" not in said
+    assert not list(root.rglob("*.tmp"))
+    assert not (root / "train.csv").exists()
+    assert main([*words, str(root), "--resume"]) == 0
+    assert main([*words, str(tmp_path / "again")]) == 0
+    assert_same_files(root, tmp_path / "again")
+
+
+@pytest.mark.usefixtures("interruptible")
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize("delay", [0.2, 0.6, 1.0, 1.5, 4.0])
+def test_signals_at_any_time_leave_no_process_of_noise(
+    tmp_path: Path, number: int, status: int, delay: float
+) -> None:
+    root = write_training_set(tmp_path / "set")
+    words = ["dataset", "noise", str(root), "--runs", "100000", "--jobs", "2"]
+    end = time.monotonic() + delay
+    ended_with, said = ended(words, lambda: time.monotonic() > end, number)
+    assert ended_with == status, said
+    assert said.splitlines()[-1] in ("interrupted", "terminated")
     assert "Traceback" not in said

@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import re
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,7 +13,7 @@ import pytest
 from helpers.training_set import SMALL, assert_same_files
 
 from cbagan_ompl import ConfigError, DatasetError
-from cbagan_ompl.datasets.dataset import Dataset, load_dataset
+from cbagan_ompl.datasets.dataset import Dataset, load_dataset, read_image
 from cbagan_ompl.datasets.generation import (
     RECORD,
     GenerationSettings,
@@ -19,7 +22,7 @@ from cbagan_ompl.datasets.generation import (
     generate_map,
 )
 from cbagan_ompl.datasets.geodesic import distance_field
-from cbagan_ompl.datasets.importing import describe
+from cbagan_ompl.datasets.importing import describe, write_dataset
 from cbagan_ompl.map_generators import MAP_GENERATORS, MIN_SIZE
 from cbagan_ompl.maps.connectivity import connects
 from cbagan_ompl.maps.grid_map import GridMap
@@ -100,11 +103,82 @@ def test_a_folder_with_a_set_is_not_overwritten(small_folder: Path, tmp_path: Pa
         generate(tmp_path, SMALL, jobs=1, resume=True)
 
 
+@pytest.mark.parametrize("name", ["maps", "tasks", "train.csv", "test.csv"])
+def test_files_of_others_are_not_replaced(
+    small_dataset: Dataset, tmp_path: Path, name: str
+) -> None:
+    (tmp_path / name).write_text("not ours")
+    for write in (
+        lambda: generate(tmp_path, SMALL, jobs=1, resume=False),
+        lambda: generate(tmp_path, SMALL, jobs=1, resume=True),
+        lambda: write_dataset(tmp_path, small_dataset),
+    ):
+        with pytest.raises(ConfigError, match=rf"other files that a set would replace \({name}\)"):
+            write()
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+    assert (tmp_path / name).read_text() == "not ours"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "{",
+        "[" * 100_000,
+        "1" * 10_000,
+        "\ud800",
+        '{"settings": {}, "ompl": ' + "9" * 4000 + "}",
+        " " * 2**21,
+    ],
+)
+def test_damaged_records(tmp_path: Path, text: str) -> None:
+    (tmp_path / RECORD).write_text(text, errors="surrogatepass")
+    with pytest.raises((DatasetError, ConfigError), match=RECORD):
+        generate(tmp_path, SMALL, jobs=1, resume=True)
+
+
+def test_a_full_disk_leaves_no_half_files(tmp_path: Path) -> None:
+    script = """
+import resource, sys
+from pathlib import Path
+from cbagan_ompl.errors import DatasetError
+from cbagan_ompl.datasets.generation import GenerationSettings, generate
+settings = GenerationSettings(maps=2, tasks=40, runs=1, generators=("blocks",))
+resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))  # less than the list of the tasks
+if __name__ == "__main__":
+    try:
+        generate(Path(sys.argv[1]), settings, 1, False, False)
+    except DatasetError as error:
+        print(error)
+"""
+    (tmp_path / "script.py").write_text(script)
+    done = subprocess.run(
+        [sys.executable, str(tmp_path / "script.py"), str(tmp_path / "set")],
+        capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+    assert re.match(r"cannot write .*/map_\d\.csv: File too large", done.stdout), done
+    files = [path for path in (tmp_path / "set").rglob("*") if path.is_file()]
+    assert files
+    assert all(path.suffix in (".png", ".json") for path in files)
+    for path in files:
+        if path.suffix == ".png":
+            read_image(path, 64)
+
+
 @pytest.mark.parametrize(
     ("option", "value", "message"),
     [
-        ("maps", 0, "maps must be at least 1"),
-        ("size", 40, "size must be at least 48, got 40"),
+        ("maps", 10**9, "at most 524288"),
+        ("maps", "3", "maps is a whole number"),
+        ("maps", True, "maps is a whole number"),
+        ("tasks", 10**300, "at most 524288, got <an integer of 997 bits>"),
+        ("tasks", 200_000, "up to 524288 tasks, 1200000 are asked for"),
+        ("size", 5000, "at most 4096"),
+        ("hard_fraction", "half", "hard_fraction is a finite number"),
+        ("range", 10**400, "range must be above 0"),
+        ("min_distance", 1j, "min_distance is a finite number"),
+        ("seed", 1.5, "seed is a whole number"),
+        ("maps", 0, "maps is a whole number of at least 1, got 0"),
+        ("size", 40, "size is a whole number of at least 48, got 40"),
         (
             "generators",
             ("blocks", "castles"),

@@ -62,16 +62,11 @@ def test_files_that_are_no_set(tmp_path: Path) -> None:
         import_dataset(tmp_path / "empty.tar")
 
 
-def test_tar_archives_need_a_python_that_unpacks_them_safely(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_set_in_a_folder_of_an_archive_is_called_after_it(tmp_path: Path) -> None:
     root = write_training_set(tmp_path / "set")
     with tarfile.open(tmp_path / "set.tar", "w") as tar:
         tar.add(root, "set")
     assert import_dataset(tmp_path / "set.tar").name == "set"
-    monkeypatch.delattr(tarfile, "data_filter")
-    with pytest.raises(DatasetError, match=r"3\.10\.12.*unpack it yourself, and give the folder"):
-        import_dataset(tmp_path / "set.tar")
 
 
 def test_archives_that_are_damaged_or_ambiguous(tmp_path: Path) -> None:
@@ -101,7 +96,7 @@ def test_faults_inside_an_archive_name_the_archive_and_the_file(tmp_path: Path) 
     (root / "maps" / "map_1.png").write_bytes(b"")
     with tarfile.open(tmp_path / "set.tar", "w") as archive:
         archive.add(root, "inner")
-    with pytest.raises(DatasetError, match=r"set\.tar: inner/maps/map_1\.png: not an image"):
+    with pytest.raises(DatasetError, match=r"set\.tar: inner/maps/map_1\.png: the file is empty"):
         import_dataset(tmp_path / "set.tar")
 
 

@@ -25,7 +25,7 @@ def test_faults_in_stored_predictions(folder: Path, dataset: Dataset, tmp_path: 
     with pytest.raises(DatasetError, match=r"roi_1\.png"):
         load_predictions(tmp_path, folder, "test")
     cv2.imwrite(str(tmp_path / "roi_1.png"), np.zeros((5, 5, 3), np.uint8))
-    with pytest.raises(DatasetError, match="differs in size"):
+    with pytest.raises(DatasetError, match="5 x 5 pixels, but 32 x 32 are expected"):
         load_predictions(tmp_path, folder, "test")
     (tmp_path / "results.csv").write_text("label\na\n")
     with pytest.raises(DatasetError, match="columns are true_roi, pred_roi"):

@@ -1,4 +1,4 @@
-"""A command that is interrupted as by Ctrl-C in a terminal."""
+"""A command that is interrupted as by Ctrl-C in a terminal, or ended by SIGTERM."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 # Only against hanging: a busy machine may take long.
 _PATIENCE_S = 300
@@ -41,3 +42,50 @@ def interrupted(words: list[str], ready: Callable[[], bool]) -> tuple[int, str]:
     finally:
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)
+
+
+def ended(words: list[str], ready: Callable[[], bool], number: int) -> tuple[int, str]:
+    """Exit status of a command and what it wrote to stderr; fails if a process of it stays.
+
+    Ctrl-C goes to all of its processes, other signals to the command alone, as ``kill`` does it.
+
+    Args:
+        words: of the command line.
+        ready: whether the command is where it is to be ended.
+        number: of the signal.
+    """
+    process = subprocess.Popen(
+        [sys.executable, "-m", "cbagan_ompl.cli", *words],
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        end = time.monotonic() + _PATIENCE_S
+        while not ready() and process.poll() is None and time.monotonic() < end:
+            time.sleep(0.02)
+        assert process.poll() is None, process.communicate()[1]
+        (os.killpg if number == signal.SIGINT else os.kill)(process.pid, number)
+        _, said = process.communicate(timeout=_PATIENCE_S)
+        end = time.monotonic() + 2
+        while (left := processes_of(process.pid)) and time.monotonic() < end:
+            time.sleep(0.02)
+        assert not left, f"{left} of {words} stay"
+        return process.returncode, said
+    finally:
+        for pid in processes_of(process.pid):
+            os.kill(pid, signal.SIGKILL)
+
+
+def processes_of(session: int) -> list[int]:
+    """Processes of a session that run, from /proc."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            state, _, _, its_session = path.read_text().rpartition(")")[2].split()[:4]
+        except OSError:  # has ended meanwhile
+            continue
+        if int(its_session) == session and state not in "ZX":
+            found.append(int(path.parent.name))
+    return found

@@ -14,7 +14,9 @@ from cbagan_ompl.maps.grid_map import GridMap
 from cbagan_ompl.maps.raw_map import MAX_SIDE
 
 
-@pytest.mark.parametrize("suffix", [".png", ".bmp", ".pgm", ".jpg", ".jpeg", ".PNG", ".Jpg"])
+@pytest.mark.parametrize(
+    "suffix", [".png", ".bmp", ".pgm", ".ppm", ".jpg", ".jpeg", ".PNG", ".Jpg"]
+)
 def test_images(tmp_path, suffix):
     grid = GridMap.load(write_image(tmp_path / f"some map.v2{suffix}", SHAPE))
     np.testing.assert_array_equal(grid.free, SHAPE > 0)
@@ -87,24 +89,59 @@ def test_pgm_in_all_its_forms(tmp_path, data, free):
     assert GridMap.load(path).free.tolist() == np.array(free, dtype=bool).tolist()
 
 
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"P3\n# three pixels\n3 1 255\n255 0 0  0 255 0  0 0 255\n",
+        b"P6 3 1 # size\n255\n" + bytes((255, 0, 0, 0, 255, 0, 0, 0, 255)),
+        b"P6 3 1 1000\n" + struct.pack(">9H", 1000, 0, 0, 0, 1000, 0, 0, 0, 1000),
+    ],
+)
+def test_ppm_becomes_gray_by_its_brightness(tmp_path, data):
+    path = tmp_path / "colour.ppm"
+    path.write_bytes(data)
+    for threshold, free in ((0.5, [0, 1, 0]), (0.29, [1, 1, 0]), (0.11, [1, 1, 1])):
+        grid = GridMap.load(path, threshold=threshold)
+        assert grid.free.tolist() == [[bool(pixel) for pixel in free]]
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b"P6 3 3 255\n" + bytes(26), "3 x 3 pixels are announced and 8 are there"),
+        (b"P3 1 1 9\n1 2", "1 x 1 pixels are announced and 0 are there"),
+        (b"P3 1 1 9\n1 2 10", "the PPM holds levels outside 0 to 9"),
+        (b"P6 1 1\n", "the PPM header is incomplete, expected P6"),
+        (b"P6 0 1 255\n", "are no PPM"),
+    ],
+)
+def test_broken_ppm(tmp_path, data, message):
+    path = tmp_path / "broken.ppm"
+    path.write_bytes(data)
+    with pytest.raises(MapError, match=message):
+        GridMap.load(path)
+
+
 def test_content_counts_not_the_suffix(tmp_path):
     write_image(tmp_path / "a.png", SHAPE).rename(tmp_path / "a.pgm")
     np.testing.assert_array_equal(GridMap.load(tmp_path / "a.pgm").free, SHAPE > 0)
 
 
-@pytest.mark.parametrize("suffix", [".png", ".bmp", ".pgm", ".jpg"])
+@pytest.mark.parametrize("suffix", [".png", ".bmp", ".pgm", ".ppm", ".jpg"])
 @pytest.mark.parametrize("kept", [0.02, 0.3, 0.6, 0.98])
 def test_truncated_images(tmp_path, suffix, kept):
     noise = np.random.default_rng(0).integers(0, 2, (90, 70)).astype(np.uint8) * 255
     path = write_image(tmp_path / f"cut{suffix}", noise)
     data = path.read_bytes()
     path.write_bytes(data[: int(len(data) * kept)])
-    with pytest.raises(MapError, match=r"cut\.\w+: the (image is truncated|PGM header is incom)"):
+    with pytest.raises(
+        MapError, match=r"cut\.\w+: the (image is truncated|P[GP]M header is incom)"
+    ):
         GridMap.load(path)
 
 
-@pytest.mark.parametrize("suffix", [".png", ".bmp", ".pgm", ".jpg"])
-def test_no_prefix_of_a_image_is_a_map(tmp_path, suffix):
+@pytest.mark.parametrize("suffix", [".png", ".bmp", ".pgm", ".ppm", ".jpg"])
+def test_no_prefix_of_an_image_is_a_map(tmp_path, suffix):
     path = write_image(tmp_path / f"cut{suffix}", SHAPE[:20, :20])
     data = path.read_bytes()
     for length in range(0, len(data), 7):
