@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from math import cos, isfinite, sin
+from math import cos, sin
 from os import PathLike
 from typing import Any, NamedTuple
 
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..common.validation import is_finite_number
-from ..errors import MapError, TaskError
+from ..errors import MapError, TaskError, show
 from .collision import segment_is_free
 from .connectivity import label_components
 from .loading import read_map
@@ -36,6 +36,10 @@ class Affine(NamedTuple):
         return np.stack(
             (self.a * x + self.b * y + self.c, self.d * x + self.e * y + self.f), axis=-1
         )
+
+
+# How far the way to the world frame and back may shift a corner of a map, in pixels.
+_MOST_ROUNDING = 1e-3
 
 
 class GridMap:
@@ -61,8 +65,9 @@ class GridMap:
 
     Raises:
         MapError: not a 2-D array of at least 1 x 1 pixel, too large (see
-            :func:`cbagan_ompl.maps.raw_map.check_map_size`), no free pixel, or a resolution or
-            origin that is not finite (resolution also positive).
+            :func:`cbagan_ompl.maps.raw_map.check_map_size`), no free pixel, a resolution or
+            origin that is not finite (resolution also positive), an origin so far away that pixels
+            cannot be told apart, a name that is no text, or ``unknown`` of another shape or type.
 
     Example:
         >>> grid = GridMap([[1, 1, 0], [1, 0, 0]], resolution=0.5)
@@ -79,41 +84,32 @@ class GridMap:
         name: str = "map",
         unknown: NDArray[np.bool_] | None = None,
     ) -> None:
-        try:
-            cells = np.asarray(free)
-        except ValueError as error:  # rows of different lengths
-            raise MapError(f"{name}: a map is a 2-D array (H, W): {error}") from error
-        if cells.ndim != 2 or cells.size == 0:
-            raise MapError(
-                f"{name}: a map is a 2-D array (H, W) of at least one pixel, "
-                f"this one has shape {cells.shape}"
-            )
-        check_map_size(cells.shape[1], cells.shape[0], name)
-        if cells.dtype.kind not in "buif":
-            raise MapError(f"{name}: a map holds booleans or numbers, not {cells.dtype}")
-        if cells.dtype.kind == "f" and not np.isfinite(cells).all():
-            raise MapError(f"{name}: the map holds NaN or infinite values")
-        if not (is_finite_number(resolution) and resolution > 0 and isfinite(1 / resolution)):
+        if not isinstance(name, str):
+            raise MapError(f"the name of a map is a text, got {show(name)}")
+        cells = _check_cells(free, name)
+        if not (is_finite_number(resolution) and resolution > 0):
             raise MapError(
                 f"{name}: resolution is the length of a pixel in world units and must be "
-                f"positive, got {resolution!r}"
+                f"positive, got {show(resolution)}"
             )
-        if origin is not None and not (
-            isinstance(origin, Sequence | np.ndarray)
-            and len(origin) == 3
-            and all(map(is_finite_number, origin))
-        ):
-            raise MapError(f"{name}: origin is (x, y, yaw) with finite numbers, got {origin!r}")
         self.free: NDArray[np.bool_] = np.ascontiguousarray(cells != 0)
         if not self.free.any():
             raise MapError(f"{name}: every pixel is blocked, there is nowhere to plan")
         self.free.setflags(write=False)
         self.resolution = float(resolution)
-        self.origin = (
-            None if origin is None else (float(origin[0]), float(origin[1]), float(origin[2]))
-        )
+        self.origin = None if origin is None else _check_origin(origin, name)
         self.name = name
         self.unknown = unknown
+        if unknown is not None and not (
+            isinstance(unknown, np.ndarray)
+            and unknown.shape == self.shape
+            and unknown.dtype == np.bool_
+        ):
+            raise MapError(
+                f"{name}: unknown is an array of booleans of shape {self.shape}, got "
+                f"{show(unknown)}"
+            )
+        self._check_frame()
 
     @classmethod
     def load(cls, path: str | PathLike[str], **options: Any) -> GridMap:
@@ -129,8 +125,23 @@ class GridMap:
             MapError: the file is missing, unreadable, truncated, empty or of an unknown kind.
             ConfigError: an unknown option, or one with a value that makes no sense.
         """
+        if not isinstance(path, str | PathLike):
+            raise MapError(f"a map file is given by its path, got {show(path)}")
         raw = read_map(path, **options)
         return cls(raw.free, raw.resolution, raw.origin, name=raw.name, unknown=raw.unknown)
+
+    def _check_frame(self) -> None:
+        corners = np.array([(0.0, 0.0), (self.width, self.height)])
+        with np.errstate(all="ignore"):
+            try:
+                shift = np.abs(self.to_pixel(self.to_world(corners)) - corners).max()
+            except ArithmeticError:  # Python's own floats
+                shift = np.inf
+        if not shift < _MOST_ROUNDING:
+            raise MapError(
+                f"{self.name}: with a resolution of {self.resolution:g} and the origin "
+                f"{self.origin} numbers are too coarse for the pixels; move the origin near the map"
+            )
 
     @property
     def width(self) -> int:
@@ -177,12 +188,20 @@ class GridMap:
         return Affine(c, s, x - s * self.height, s, -c, y + c * self.height)
 
     def to_pixel(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Return world points, shape (..., 2), as continuous pixel coordinates (u, v)."""
-        return self.pixel_from_world(np.asarray(points, dtype=np.float64))
+        """Return world points, shape (..., 2), as continuous pixel coordinates (u, v).
+
+        Raises:
+            MapError: not an array of that shape.
+        """
+        return self.pixel_from_world(_as_points(points))
 
     def to_world(self, pixels: ArrayLike) -> NDArray[np.float64]:
-        """Return continuous pixel coordinates (u, v), shape (..., 2), as world points."""
-        return self.world_from_pixel(np.asarray(pixels, dtype=np.float64))
+        """Return continuous pixel coordinates (u, v), shape (..., 2), as world points.
+
+        Raises:
+            MapError: not an array of that shape.
+        """
+        return self.world_from_pixel(_as_points(pixels))
 
     @property
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -196,6 +215,9 @@ class GridMap:
         """Return whether world points, shape (..., 2), lie in free pixels.
 
         Outside the map nothing is free.
+
+        Raises:
+            MapError: not an array of that shape.
         """
         pixels = self.to_pixel(points)
         within = (pixels >= 0) & (pixels < (self.width, self.height))
@@ -208,8 +230,13 @@ class GridMap:
         """Return whether a polyline of world points, shape (N, 2), stays in free pixels.
 
         The check is exact (see :func:`cbagan_ompl.maps.collision.segment_is_free`).
+
+        Raises:
+            MapError: not an array of that shape.
         """
         pixels = self.to_pixel(path)
+        if pixels.ndim != 2:
+            raise MapError(f"a path has shape (N, 2), this one {pixels.shape}")
         if len(pixels) == 1:
             return bool(self.is_free(path).all())
         return all(
@@ -233,7 +260,8 @@ class GridMap:
             MapError: radius negative or not finite, or nothing stays free.
         """
         if not is_finite_number(radius) or radius < 0:
-            raise MapError(f"the robot radius must be a length of at least 0, got {radius!r}")
+            raise MapError(f"the robot radius must be a length of at least 0, got {show(radius)}")
+        radius = float(radius)
         if radius == 0 or self.free.all():
             return self
         # The gap between two pixels is the distance of their centres with one of them grown by a
@@ -278,7 +306,7 @@ class GridMap:
             TaskError: one of them is no point, outside the map or in an obstacle, the two are
                 equal, or no path connects them.
         """
-        endpoints = self._check_point("start", start), self._check_point("goal", goal)
+        endpoints = self._check_endpoint("start", start), self._check_endpoint("goal", goal)
         if np.array_equal(*endpoints):
             raise TaskError(f"start and goal are the same point {_show(endpoints[0])}")
         (u0, v0), (u1, v1) = self.to_pixel(endpoints).astype(np.intp)
@@ -290,13 +318,8 @@ class GridMap:
             )
         return endpoints
 
-    def _check_point(self, role: str, point: ArrayLike) -> NDArray[np.float64]:
-        try:
-            position = np.asarray(point, dtype=np.float64)
-        except (TypeError, ValueError):
-            position = np.empty(0)
-        if position.shape != (2,) or not np.isfinite(position).all():
-            raise TaskError(f"{role} must be two finite numbers x, y in world units, got {point!r}")
+    def _check_endpoint(self, role: str, point: ArrayLike) -> NDArray[np.float64]:
+        position = check_point(role, point)
         column, row = np.floor(self.to_pixel(position)).tolist()
         if not (0 <= column < self.width and 0 <= row < self.height):
             low, high = self.bounds
@@ -318,6 +341,60 @@ class GridMap:
             f"GridMap({self.name!r}, {self.width} x {self.height} pixels of {self.resolution:g}, "
             f"{frame}, {self.free.mean():.0%} free)"
         )
+
+
+def check_point(role: str, point: ArrayLike) -> NDArray[np.float64]:
+    """Return a point as a (2,) array.
+
+    Args:
+        role: of the point, for the message.
+        point: (x, y), any real numbers.
+
+    Raises:
+        TaskError: not two finite numbers; texts and truth values are none.
+    """
+    try:
+        values = np.asarray(point).tolist()
+    except Exception:  # rows of different lengths, or whatever the class raises
+        values = None
+    if not (isinstance(values, list) and len(values) == 2 and all(map(is_finite_number, values))):
+        raise TaskError(f"{role} must be two finite numbers x, y in world units, got {show(point)}")
+    return np.array([float(value) for value in values])
+
+
+def _check_cells(free: ArrayLike, name: str) -> NDArray[Any]:
+    try:
+        cells = np.asarray(free)
+    except Exception as error:  # rows of different lengths, or whatever the class raises
+        raise MapError(f"{name}: a map is a 2-D array (H, W), got {show(free)}") from error
+    if cells.ndim != 2 or cells.size == 0:
+        raise MapError(
+            f"{name}: a map is a 2-D array (H, W) of at least one pixel, "
+            f"this one has shape {show(cells.shape)}"
+        )
+    check_map_size(cells.shape[1], cells.shape[0], name)
+    if cells.dtype.kind not in "buif":
+        raise MapError(f"{name}: a map holds booleans or numbers, not {show(str(cells.dtype))}")
+    if cells.dtype.kind == "f" and not np.isfinite(cells).all():
+        raise MapError(f"{name}: the map holds NaN or infinite values")
+    return cells
+
+
+def _check_origin(origin: object, name: str) -> tuple[float, float, float]:
+    pose = origin.tolist() if isinstance(origin, np.ndarray) else origin
+    if not (isinstance(pose, Sequence) and len(pose) == 3 and all(map(is_finite_number, pose))):
+        raise MapError(f"{name}: origin is (x, y, yaw) with finite numbers, got {show(origin)}")
+    return float(pose[0]), float(pose[1]), float(pose[2])
+
+
+def _as_points(points: ArrayLike) -> NDArray[np.float64]:
+    try:
+        array = np.asarray(points, dtype=np.float64)
+    except Exception as error:  # rows of different lengths, texts, or whatever the class raises
+        raise MapError(f"points are numbers of shape (..., 2), got {show(points)}") from error
+    if array.shape[-1:] != (2,):
+        raise MapError(f"points have shape (..., 2), these {array.shape}")
+    return array
 
 
 def _show(point: NDArray[np.float64]) -> str:

@@ -27,12 +27,15 @@ class PlannerTraits:
         keeps_sampler: whether it makes its sampler when it is set up and keeps it for good.
         hangs_with: the bindings, see :data:`.compat.BINDINGS`, with which a solve never returns
             when its termination condition is a Python function; None for no bindings.
+        hangs_at_optimum: whether a solve never returns once it has a path as short as the straight
+            line.
     """
 
     hook: str
     stops_at_first: bool = False
     keeps_sampler: bool = False
     hangs_with: str | None = None
+    hangs_at_optimum: bool = False
 
 
 #: Every planner that some hook reaches on some build, by OMPL's name of its class.
@@ -59,7 +62,7 @@ PLANNERS = {
     "RRTsharp": PlannerTraits(STATE_SAMPLER),
     "RRTstar": PlannerTraits(GOAL_INJECTION),
     "SBL": PlannerTraits(VALID_STATE_SAMPLER, stops_at_first=True),
-    "SORRTstar": PlannerTraits(GOAL_INJECTION),
+    "SORRTstar": PlannerTraits(GOAL_INJECTION, hangs_at_optimum=True),
     "SPARS": PlannerTraits(VALID_STATE_SAMPLER, hangs_with="boost"),
     "SPARStwo": PlannerTraits(VALID_STATE_SAMPLER, hangs_with="boost"),
     "SST": PlannerTraits(STATE_SAMPLER),
@@ -119,6 +122,11 @@ def keeps_sampler(planner: str) -> bool:
 def hangs_on_python_termination(planner: str) -> bool:
     """Return whether a solve with a termination condition in Python never returns."""
     return planner in PLANNERS and PLANNERS[planner].hangs_with == BINDINGS
+
+
+def hangs_at_optimum(planner: str) -> bool:
+    """Return whether a solve never returns once it has a path as short as the straight line."""
+    return planner in PLANNERS and PLANNERS[planner].hangs_at_optimum
 
 
 def _list_reached() -> str:

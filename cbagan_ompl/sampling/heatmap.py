@@ -5,16 +5,18 @@ from __future__ import annotations
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, SupportsIndex
 
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import HeatmapError
+from ..common.validation import random_generator, whole_number
+from ..errors import HeatmapError, show
 from ..maps.connectivity import label_components
-from ..maps.grid_map import GridMap
+from ..maps.grid_map import GridMap, check_point
 from ..maps.grid_search import pull_taut, shortest_path
+from .heatmap_files import read_heatmap_values
 
 #: A pixel whose value is at least this belongs to the promising region.
 REGION_THRESHOLD = 0.5
@@ -24,6 +26,9 @@ REGION_THRESHOLD = 0.5
 _CORRIDOR_FRACTION = 0.03
 _BRIDGE_FRACTION = 0.015
 _MIN_HALF_WIDTH = 2.0
+
+# Most points that one call of Heatmap.sample gives: about a gigabyte on the way.
+_MOST_SAMPLES = 10**7
 
 # Longest side of the coarse grid in which bridges are looked for.
 _REPAIR_SIZE = 64
@@ -46,7 +51,7 @@ class Heatmap:
         grid: the map.
 
     Raises:
-        HeatmapError: wrong shape or type, NaN, infinite or negative values, values above 1, or
+        HeatmapError: no :class:`GridMap`, wrong shape or type, NaN, infinite or negative values, values above 1, or
             nothing above 0 on free space.
 
     Example:
@@ -58,7 +63,13 @@ class Heatmap:
     """
 
     def __init__(self, values: ArrayLike, grid: GridMap) -> None:
-        raw = np.asarray(values)
+        _check_grid(grid)
+        try:
+            raw = np.asarray(values)
+        except Exception as error:  # rows of different lengths, or whatever the class raises
+            raise HeatmapError(
+                f"a heat map is an array (H, W) of numbers, got {show(values)}"
+            ) from error
         if raw.shape != grid.shape:
             raise HeatmapError(
                 f"a heat map of {grid.name} has shape {grid.shape} (rows, columns), "
@@ -81,20 +92,17 @@ class Heatmap:
     def load(cls, path: str | PathLike[str], grid: GridMap) -> Heatmap:
         """Read a heat map of a grid: a grey image (black 0, white 1) or a NumPy ``.npy`` array.
 
+        Args:
+            path: the file; images are PNG, JPEG, BMP or PGM, told by their first bytes.
+            grid: the map, of the same size.
+
         Raises:
             HeatmapError: the file cannot be read, or holds no heat map of this grid.
         """
-        source = Path(path)
-        try:
-            if source.suffix.lower() == ".npy":
-                return cls(np.load(source, allow_pickle=False), grid)
-            encoded = np.frombuffer(source.read_bytes(), np.uint8)
-        except (OSError, ValueError, EOFError) as error:
-            raise HeatmapError(f"cannot read the heat map {source}: {error}") from error
-        image = cv2.imdecode(encoded, cv2.IMREAD_GRAYSCALE) if encoded.size else None
-        if image is None:
-            raise HeatmapError(f"{source} is neither an image nor a .npy array")
-        return cls(image, grid)
+        _check_grid(grid)
+        if not isinstance(path, str | PathLike):
+            raise HeatmapError(f"the file of a heat map is a path, got {show(path)}")
+        return cls(read_heatmap_values(Path(path), grid.shape), grid)
 
     @classmethod
     def uniform(cls, grid: GridMap) -> Heatmap:
@@ -103,6 +111,7 @@ class Heatmap:
         Args:
             grid: the map.
         """
+        _check_grid(grid)
         return cls(grid.free, grid)
 
     @classmethod
@@ -117,6 +126,7 @@ class Heatmap:
         Raises:
             TaskError: see :meth:`GridMap.check_task`.
         """
+        _check_grid(grid)
         endpoints = grid.check_task(start, goal)
         return cls(
             _paint_band(
@@ -140,6 +150,7 @@ class Heatmap:
         Raises:
             TaskError: see :meth:`GridMap.check_task`.
         """
+        _check_grid(grid)
         endpoints = grid.to_pixel(grid.check_task(start, goal))
         pixels = shortest_path(grid.free, *pixel_pair(endpoints))
         assert pixels is not None, "check_task has made sure that a path exists"
@@ -162,8 +173,11 @@ class Heatmap:
         Args:
             start: (x, y), world.
             goal: (x, y), world.
+
+        Raises:
+            TaskError: one of them is no point.
         """
-        endpoints = np.array((start, goal), dtype=np.float64)
+        endpoints = np.array((check_point("start", start), check_point("goal", goal)))
         if not self.grid.is_free(endpoints).all():
             return False
         first, second = pixel_pair(self.grid.to_pixel(endpoints))
@@ -197,22 +211,28 @@ class Heatmap:
         )
         return Heatmap(np.maximum(self.values, bridge), self.grid)
 
-    def sample(self, n: int, rng: np.random.Generator | int | None = None) -> NDArray[np.float64]:
+    def sample(
+        self, n: SupportsIndex, rng: np.random.Generator | SupportsIndex | None = None
+    ) -> NDArray[np.float64]:
         """Sample points with a density proportional to the values.
 
         Pixels are sampled exactly, by the inverse of the cumulative sum; inside its pixel a point
         is uniform.
 
         Args:
-            n: how many points.
+            n: how many points, at most ten million.
             rng: a generator, or the seed of a new one.
 
         Returns:
             World points, shape (n, 2).
+
+        Raises:
+            ConfigError: ``n`` is no such number, or ``rng`` neither a generator nor a seed.
         """
-        generator = np.random.default_rng(rng)
+        count = whole_number("n", n, 0, _MOST_SAMPLES)
+        generator = random_generator(rng)
         cumulative = self.values.ravel()[self._support].cumsum(dtype=np.float64)
-        pixels = sample_pixels(self._support, cumulative, n, generator)
+        pixels = sample_pixels(self._support, cumulative, count, generator)
         return sample_in_pixels(self.grid, pixels, generator)
 
     @property
@@ -223,6 +243,27 @@ class Heatmap:
     def __repr__(self) -> str:
         fraction = self.region.sum() / self.grid.free.sum()
         return f"Heatmap({self.grid.name!r}, region {fraction:.0%} of free space)"
+
+
+def check_heatmap(heatmap: object) -> None:
+    """Raise if a value is no heat map.
+
+    Raises:
+        HeatmapError: it is none; the message says how to make one of an array.
+    """
+    if not isinstance(heatmap, Heatmap):
+        raise HeatmapError(
+            f"expected a Heatmap, got {show(heatmap)}; an array of values becomes one with "
+            "Heatmap(values, grid)"
+        )
+
+
+def _check_grid(grid: object) -> None:
+    if not isinstance(grid, GridMap):
+        raise HeatmapError(
+            f"a heat map lies on a GridMap, got {show(grid)}; an array of free pixels becomes one "
+            "with GridMap(free), a map file with GridMap.load(path)"
+        )
 
 
 def sample_pixels(
@@ -276,7 +317,8 @@ def _to_unit_range(raw: NDArray[Any]) -> NDArray[np.float32]:
         return raw.astype(np.float32) / np.float32(full)
     if raw.dtype.kind not in "if":
         raise HeatmapError(f"a heat map holds real numbers, not {raw.dtype}")
-    values = raw.astype(np.float32)
+    with np.errstate(over="ignore"):  # what is too large becomes infinite
+        values = raw.astype(np.float32)
     if not np.isfinite(values).all():
         raise HeatmapError(
             f"the heat map holds {int((~np.isfinite(values)).sum())} NaN or infinite values"
