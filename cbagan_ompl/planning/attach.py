@@ -21,6 +21,7 @@ from .hooks import (
     GOAL_INJECTION,
     STATE_SAMPLER,
     VALID_STATE_SAMPLER,
+    class_name,
     hook_of,
     keeps_sampler,
     stops_at_first,
@@ -148,7 +149,7 @@ def attach(
     check_heatmap(heatmap)
     planner = _planner_of(setup)
     _check_attachable(setup, planner)
-    name = _class_name(planner)
+    name = class_name(planner)
     hook = hook_of(name)
     if options.sharpness is None:
         sharpness = 1.0 if stops_at_first(name) else OPTIMIZING_SHARPNESS
@@ -207,15 +208,6 @@ def _check_attachable(setup: Any, planner: Any) -> None:
         raise PlannerError(
             "this planner samples a heat map already: call detach() of its attachment first"
         )
-
-
-def _class_name(planner: Any) -> str:
-    """Return OMPL's name of the class, also for Python subclasses of it."""
-    names = compat.planner_names()
-    return next(
-        (kind.__name__ for kind in type(planner).__mro__ if kind.__name__ in names),
-        type(planner).__name__,
-    )
 
 
 def _reach_of(planner: Any) -> float:

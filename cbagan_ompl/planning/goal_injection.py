@@ -63,7 +63,9 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
 
     def maxSampleCount(self) -> int:  # noqa: N802
         """Return no end of samples for the planner, the original's number for anybody else."""
-        return _ENDLESS if self._monitor.is_sampling() else int(self._original.maxSampleCount())
+        monitor = self._monitor
+        monitor.counts_asked += 1
+        return _ENDLESS if monitor.is_sampling() else int(self._original.maxSampleCount())
 
     def couldSample(self) -> bool:  # noqa: N802
         """Return True, as the original does; the planners that injection is for never ask."""
@@ -73,7 +75,9 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
     def sampleGoal(self, state: Any) -> None:  # noqa: N802
         """Sample the heat map for the planner, the original goal for anybody else."""
         monitor = self._monitor
+        monitor.check_asker()
         sampling = monitor.takes_sample(sys._getframe(1))
+        monitor.counts_asked = 0
         if sampling:
             self._sampler.begin()
         if not sampling or (not monitor.has_solution and self._is_goals_turn()):
