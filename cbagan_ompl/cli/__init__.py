@@ -60,6 +60,8 @@ def load_commands() -> None:
 
     So the command line can handle Ctrl-C and SIGTERM before.
     """
+    # Damaged images are errors of ours, and need no other line.
+    os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
     from . import benchmark, dataset, evaluate, plan, train  # noqa: F401
 
 

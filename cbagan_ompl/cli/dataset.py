@@ -28,9 +28,9 @@ the CBAGAN-RRT paper.
 _IMPORT_HELP = """\
 Read a training set, check all of its files, and print what it holds.
 
-PATH is a folder or an archive: .zip, or .tar, perhaps in gzip, bzip2 or xz. Only lists and images are
-unpacked; archives with links, of more than 131,072 members or 2 GiB, or that grow to more than 200
-times their size are refused: unpack them yourself, where you trust them.
+PATH is a folder or an archive: .zip, or .tar, perhaps in gzip, bzip2 or xz. Only lists and images
+are unpacked; archives with links, of more than 131,072 members or 2 GiB, or that grow to more than
+200 times their size are refused: unpack them yourself, where you trust them.
 
 With --output a copy is written, which can be split again: the paper's set is split by task, so that
 every test map is in training too;
