@@ -22,9 +22,11 @@ from .common.figures import (
     OBSTACLE,
     UNKNOWN,
     check_figure_path,
+    ignore_markup,
     mark_endpoints,
     write_figure,
 )
+from .common.text import one_line
 from .maps.grid_map import GridMap
 
 if TYPE_CHECKING:
@@ -44,6 +46,8 @@ _PADDING, _LEAST_PADDING = 0.03, 3
 _WIDEST, _THINNEST, _WIDTH_OF_ONE = 0.6, 0.12, 20.0
 
 _MOST_TICKS = 8
+
+_LONGEST_NAME = 60  # of a map, characters of the headline
 
 
 def save_figure(
@@ -90,6 +94,7 @@ def make_figure(result: PlanResult, grid: GridMap, *, show_tree: bool = True) ->
     figure.text(0.5, 1 - 0.25 / height, _headline(result), ha="center", va="center", fontsize=11)
     figure.text(0.5, 1 - 0.48 / height, _summary(result), ha="center", va="center", fontsize=9)
     figure.legend(handles=handles, loc="lower center", ncols=4, frameon=False, fontsize=9)
+    ignore_markup(figure)
     return figure
 
 
@@ -211,7 +216,8 @@ def _draw_scale_bar(axes: Axes, grid: GridMap) -> None:
 
 def _headline(result: PlanResult) -> str:
     outcome = f"cost {result.cost:.4g}" if result.solved else "no exact solution"
-    return f"{result.map}: {result.planner}, {result.sampler} sampler, {outcome}"
+    name = one_line(result.map, _LONGEST_NAME)
+    return f"{name}: {result.planner}, {result.sampler} sampler, {outcome}"
 
 
 def _summary(result: PlanResult) -> str:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ..common.files import make_folder, write_atomically, write_json
 from ..errors import ConfigError
 from .database import write_database
-from .logs import parse_log
+from .inputs import check_same, record_inputs
+from .logs import ExperimentLog, read_log
 from .measures import thresholds
 from .plots import save_plots
 from .report import Conditions, markdown, summary_json
@@ -16,7 +18,7 @@ from .runner import run_jobs
 from .settings import Settings
 from .statistics import results_of
 from .tasks import BenchmarkTask
-from .worker import Job, check_heatmaps, check_job
+from .worker import Job, check_heatmaps, check_job, check_log
 
 _SETTINGS, _LOGS = "settings.json", "logs"
 
@@ -35,7 +37,8 @@ class Benchmark:
 
     Raises:
         ConfigError: the folder holds a benchmark and ``resume`` is off, or one with other
-            settings; or it cannot be made; or an option that makes no sense.
+            settings, versions, maps or tasks, or something damaged; or it cannot be made; or an
+            option that makes no sense.
         PlannerError: an unknown planner, or one that no hook reaches on this OMPL.
         ModelError: an unusable model file.
         HeatmapError: a task without a heat map where there should be one.
@@ -50,38 +53,74 @@ class Benchmark:
         check_job(self._jobs[0])
         for job in self._jobs:
             check_heatmaps(job)
+        record = record_inputs(tasks, settings)
         saved = folder / _SETTINGS
-        if saved.is_file() and not resume:
-            raise ConfigError(f"{folder} holds a benchmark: go on with --resume, or choose another")
-        if saved.is_file() and not settings.is_saved_in(saved):
+        if os.path.lexists(saved):
+            if not resume:
+                raise ConfigError(
+                    f"{folder} holds a benchmark: go on with --resume, or choose another"
+                )
+            check_same(record, saved)
+            for job in self._finished():
+                _read_finished(job)
+            return
+        if os.path.isdir(logs) and any(logs.iterdir()):
             raise ConfigError(
-                f"{folder} holds a benchmark with other options, see {saved.name}: give the same "
-                "ones, or choose another folder"
+                f"{logs} holds files, and {saved} is missing, which says of what benchmark: choose "
+                "another folder, or delete this one"
             )
         make_folder(logs)
-        settings.save(saved)
+        write_json(saved, record)
 
     def run(self, processes: int, show_progress: bool = True) -> dict[str, str]:
         """Run the tasks that have no log yet; arguments and result as for :func:`.run_jobs`."""
-        remaining = [job for job in self._jobs if not job.log.is_file()]
+        remaining = [job for job in self._jobs if not os.path.lexists(job.log)]
         return run_jobs(remaining, processes, show_progress)
 
-    def finished_logs(self) -> list[Path]:
-        """Return the logs of the tasks that have been run."""
-        return [job.log for job in self._jobs if job.log.is_file()]
+    def finished_logs(self, failures: Mapping[str, str]) -> list[ExperimentLog]:
+        """Return the logs of the tasks that have been run.
+
+        Args:
+            failures: tasks that failed, by name.
+
+        Raises:
+            ConfigError: a log is damaged, or some are there and that of a task that did not fail
+                is missing.
+        """
+        finished = self._finished()
+        missing = len(self._jobs) - len(finished) - len(failures)
+        if finished and missing > 0:
+            raise ConfigError(
+                f"{missing} of {len(self._jobs)} tasks have no log in {self.folder / _LOGS}: run "
+                "them with the same command and --resume"
+            )
+        return [_read_finished(job) for job in finished]
+
+    def _finished(self) -> list[Job]:
+        return [job for job in self._jobs if os.path.lexists(job.log)]
+
+
+def _read_finished(job: Job) -> ExperimentLog:
+    """Return the log of a task, which must be one that :func:`.run_job` wrote for it."""
+    try:
+        log = read_log(job.log)
+        check_log(log, job)
+    except ConfigError as error:
+        raise ConfigError(f"{error}. Delete {job.log}, then go on with --resume") from error
+    return log
 
 
 def write_results(
-    logs: Sequence[Path],
+    logs: Sequence[ExperimentLog],
     settings: Settings,
     failures: Mapping[str, str],
     folder: Path,
     command: str,
 ) -> str:
-    """Write the database, the summary and the plots.
+    """Write the database, the summary and the plots, each whole or not at all.
 
     Args:
-        logs: logs of the tasks, at least one.
+        logs: logs of the tasks, at least one, with all measures.
         settings: settings of the benchmark.
         failures: for each task that failed the end of its output.
         folder: where to write.
@@ -91,15 +130,19 @@ def write_results(
         The report in Markdown.
 
     Raises:
-        ConfigError: a file cannot be written.
+        ConfigError: a file cannot be written, or the logs are of several versions of OMPL.
     """
+    versions = {log.version.split()[-1]: log.name for log in logs}
+    if len(versions) > 1:
+        raise ConfigError(
+            "the tasks were run with several versions of OMPL, which have no summary in common: "
+            + ", ".join(f"{name} with {version}" for version, name in versions.items())
+        )
     write_database(logs, folder / "benchmark.db")
-    parsed = [parse_log(log.read_text(encoding="utf-8")) for log in logs]
-    results = results_of(parsed, thresholds(settings.within))
-    version = parsed[0].version.split()[-1]
-    conditions = Conditions(version, len(parsed), settings, failures, command)
+    results = results_of(logs, thresholds(settings.within))
+    conditions = Conditions(next(iter(versions)), len(logs), settings, failures, command)
     write_json(folder / "summary.json", summary_json(results, conditions))
     report = markdown(results, conditions)
     write_atomically(folder / "summary.md", report)
-    save_plots(parsed, results, settings.within, folder)
+    save_plots(logs, results, settings.within, folder)
     return report

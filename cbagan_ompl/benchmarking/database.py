@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import sqlite3
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from contextlib import closing
 from pathlib import Path
 
-from .logs import ExperimentLog, PlannerLog, number, parse_log, properties_of
+from ..common.files import reason
+from ..errors import ConfigError, show
+from .log_lines import TYPES
+from .logs import ExperimentLog, PlannerLog, number, properties_of
 
 _TABLES = """
 CREATE TABLE experiments
@@ -46,28 +50,45 @@ CREATE VIEW bestPlannerConfigs AS
 """
 
 
-def write_database(logs: Sequence[Path], path: Path) -> None:
-    """Write logs into a database, with OMPL's own script where the installed build has it.
+def write_database(logs: Iterable[ExperimentLog], path: Path) -> None:
+    """Write the tables of OMPL's ``ompl_benchmark_statistics``, whole or not at all.
 
-    Args:
-        logs: files in the format of :mod:`.logs`.
-        path: the database; an existing file is replaced.
-    """
-    from ..planning.compat import fill_statistics_database
-
-    path.unlink(missing_ok=True)
-    if not fill_statistics_database(logs, path):
-        write_tables([parse_log(log.read_text(encoding="utf-8")) for log in logs], path)
-
-
-def write_tables(logs: Iterable[ExperimentLog], path: Path) -> None:
-    """Write the tables of OMPL's ``ompl_benchmark_statistics``, for builds without this script.
+    OMPL's own script is left aside: OMPL 1.7 does not have it, and it makes SQL of whatever a log
+    says. Names here come from :func:`.parse_log`, which has checked them, and are quoted.
 
     Args:
         logs: the content of the database.
-        path: the file, which must not exist yet.
+        path: of the file; an existing one is replaced.
+
+    Raises:
+        ConfigError: the file cannot be written.
+    """
+    temporary = path.with_name(f"{path.name}.tmp")
+    try:
+        try:
+            temporary.unlink(missing_ok=True)
+            write_tables(logs, temporary)
+            os.replace(temporary, path)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+    except (OSError, sqlite3.Error) as error:
+        raise ConfigError(f"cannot write {path}: {reason(error)}") from error
+
+
+def write_tables(logs: Iterable[ExperimentLog], path: Path) -> None:
+    """Write the tables into a file that does not exist yet.
+
+    Args:
+        logs: the content of the database.
+        path: of the file.
+
+    Raises:
+        sqlite3.Error: the file cannot be written; half of it may be there.
     """
     with closing(sqlite3.connect(path)) as database:
+        # Half a file is thrown away, so nothing has to be kept for a return to its beginning.
+        database.execute("PRAGMA journal_mode = OFF")
         database.executescript(_TABLES)
         for log in logs:
             _add_experiment(database, log)
@@ -134,13 +155,16 @@ def _add_columns(
     database: sqlite3.Connection, table: str, properties: Iterable[str], separator: str = "_"
 ) -> dict[str, str]:
     """Add columns for properties, "graph states INTEGER"; return their names by property."""
-    present = {row[1] for row in database.execute(f"PRAGMA table_info({table})")}
+    present = {row[1].lower() for row in database.execute(f"PRAGMA table_info({_quote(table)})")}
     columns = {}
     for name in properties:
         *words, kind = name.split()
-        columns[name] = separator.join(words)
-        if columns[name] not in present:
-            database.execute(f"ALTER TABLE {table} ADD {columns[name]} {kind}")
+        column = columns[name] = separator.join(words)
+        if kind not in TYPES:
+            raise ConfigError(f"{show(name)} is no property with its type")
+        if column.lower() not in present:
+            database.execute(f"ALTER TABLE {_quote(table)} ADD {_quote(column)} {kind}")
+            present.add(column.lower())
     return columns
 
 
@@ -155,9 +179,15 @@ def _insert(
     database: sqlite3.Connection, table: str, row: Mapping[str, object], conflict: str = ""
 ) -> int:
     """Insert a row and return its id."""
-    marks = ", ".join("?" * len(row))
+    columns, marks = ", ".join(map(_quote, row)), ", ".join("?" * len(row))
     cursor = database.execute(
-        f"INSERT {conflict} INTO {table} ({', '.join(row)}) VALUES ({marks})", list(row.values())
+        f"INSERT {conflict} INTO {_quote(table)} ({columns}) VALUES ({marks})", list(row.values())
     )
     assert cursor.lastrowid is not None, "an INSERT has a last row"
     return cursor.lastrowid
+
+
+def _quote(name: str) -> str:
+    """Return a name as SQL writes one, whatever its characters."""
+    doubled = name.replace('"', '""')
+    return f'"{doubled}"'

@@ -6,15 +6,15 @@ The format is that of `OMPL's documentation of Benchmark
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from math import inf, isfinite
+from pathlib import Path
 
-from ..errors import ConfigError
-
-_BLOCK_BEGIN, _BLOCK_END = "<<<|", "|>>>"
+from ..common.files import read_text
+from ..errors import ConfigError, show
+from .log_lines import BLOCK_BEGIN, BLOCK_END, FINITE, MAX_LOG_BYTES, NUMBER, LogLines, check_names
 
 #: OMPL's logs put this before the name of a geometric planner.
 GEOMETRIC = "geometric_"
@@ -76,94 +76,88 @@ class ExperimentLog:
     planners: tuple[PlannerLog, ...] = field(repr=False)
 
 
+def read_log(path: Path) -> ExperimentLog:
+    """Return the content of a log file.
+
+    Raises:
+        ConfigError: the file cannot be read, is larger than :data:`.MAX_LOG_BYTES`, or is no log;
+            the message names it.
+    """
+    text = read_text(path, ConfigError, MAX_LOG_BYTES)
+    try:
+        return parse_log(text)
+    except ConfigError as error:
+        raise ConfigError(f"{path}: {error}") from error
+
+
 def parse_log(text: str) -> ExperimentLog:
     """Return the content of a log that OMPL's Benchmark or :func:`format_log` wrote.
+
+    Nothing is taken on trust: names of properties, their types and numbers are checked, and counts
+    must agree with the lines. The database is made of what passed.
 
     Raises:
         ConfigError: the text is no such log, or is cut off.
     """
-    lines = _Lines(text)
+    lines = LogLines(text)
     try:
-        return ExperimentLog(
-            version=lines.match(r"(\S+ version .*)"),
-            name=lines.match(r"Experiment (.*)"),
+        log = ExperimentLog(
+            version=lines.match(r"([A-Za-z]\S{0,49} version \S.{0,99})"),
+            name=lines.match(r"Experiment (\S.{0,299})"),
             parameters=dict(
-                line.split(" = ", 1) for line in lines.several(r"(\d+) experiment properties", "0")
+                _parse_parameter(line)
+                for line in lines.several(r"([0-9]{1,3}) experiment properties", "0")
             ),
-            host=lines.match(r"Running on (.*)"),
-            date=lines.match(r"Starting at (.*)"),
+            host=lines.match(r"Running on (.{1,1000})"),
+            date=lines.match(r"Starting at (.{1,100})"),
             setup=lines.block(),
             cpu=lines.block(),
-            seed=lines.match(r"(\d+) is the random seed"),
-            time_limit=float(lines.match(r"(\S+) seconds per run")),
-            memory_limit=float(lines.match(r"(\S+) MB per run")),
-            runs=int(lines.match(r"(\d+) runs per planner")),
-            total_time=float(lines.match(r"(\S+) seconds spent to collect the data")),
+            seed=lines.match(r"([0-9]{1,20}) is the random seed"),
+            time_limit=float(lines.match(rf"({FINITE}) seconds per run")),
+            memory_limit=float(lines.match(rf"({FINITE}) MB per run")),
+            runs=int(lines.match(r"([0-9]{1,7}) runs per planner")),
+            total_time=float(lines.match(rf"({FINITE}) seconds spent to collect the data")),
             enums=tuple(
-                tuple(line.split("|")) for line in lines.several(r"(\d+) enum types?", "0")
+                tuple(line.split("|")) for line in lines.several(r"([0-9]{1,3}) enum types?", "0")
             ),
             planners=tuple(
-                _parse_planner(lines) for _ in range(int(lines.match(r"(\d+) planners")))
+                _parse_planner(lines) for _ in range(int(lines.match(r"([0-9]{1,4}) planners")))
             ),
         )
+        lines.end()
+        if not all(map(isfinite, (log.time_limit, log.memory_limit, log.total_time))):
+            raise ValueError("a limit or the total time is infinite")
+        check_names(log.parameters)
+        if any(len(planner.runs) != log.runs for planner in log.planners):
+            raise ValueError(f"not every planner has {log.runs} runs")
+        return log
     except ValueError as error:
         raise ConfigError(
             f"no benchmark log of OMPL, or one that is cut off (line {lines.number}): {error}"
         ) from error
 
 
-class _Lines:
-    """The lines of a log, read one after the other."""
-
-    def __init__(self, text: str) -> None:
-        self._lines = text.splitlines()
-        self.number = 0
-
-    def next(self) -> str:
-        """Return the next line."""
-        if self.number == len(self._lines):
-            raise ValueError("the text ends here")
-        self.number += 1
-        return self._lines[self.number - 1]
-
-    def match(self, pattern: str, default: str | None = None) -> str:
-        """Return what the pattern's group matches in the next line, or ``default`` if none does."""
-        found = re.fullmatch(pattern, self.next())
-        if found:
-            return found[1]
-        self.number -= 1
-        if default is None:
-            raise ValueError(f"expected {pattern!r}")
-        return default
-
-    def block(self) -> str:
-        """Return the text of an optional block of lines."""
-        if not self.match(f"({re.escape(_BLOCK_BEGIN)})", ""):
-            return ""
-        return "\n".join(iter(self.next, _BLOCK_END))
-
-    def several(self, count_pattern: str, default: str | None = None) -> tuple[str, ...]:
-        """Return as many lines as the next line announces."""
-        return tuple(self.next() for _ in range(int(self.match(count_pattern, default))))
+def _parse_parameter(line: str) -> tuple[str, str]:
+    name, _, value = line.partition(" = ")
+    is_text = name.endswith((" VARCHAR", " TEXT"))
+    if not (value.isprintable() if is_text else NUMBER.fullmatch(value)):
+        raise ValueError(f"{show(line)} is no property of an experiment with its value")
+    return name, value
 
 
-def _parse_planner(lines: _Lines) -> PlannerLog:
-    name = lines.next()
-    settings = lines.several(r"(\d+) common properties")
-    properties = lines.several(r"(\d+) properties for each run")
-    runs = tuple(
-        dict(zip(properties, row.split("; "), strict=False)) for row in lines.several(r"(\d+) runs")
-    )
+def _parse_planner(lines: LogLines) -> PlannerLog:
+    name = lines.match(r"(\S.{0,299})")
+    settings = lines.several(r"([0-9]{1,4}) common properties")
+    properties = lines.properties(r"([0-9]{1,4}) properties for each run")
+    runs = tuple(lines.values(row, properties, "; ") for row in lines.several(r"([0-9]{1,7}) runs"))
     progress: tuple[tuple[dict[str, str], ...], ...] = ()
-    progress_properties = lines.several(r"(\d+) progress properties for each run", "0")
+    progress_properties = lines.properties(r"([0-9]{1,4}) progress properties for each run", "0")
     if progress_properties:
         progress = tuple(
-            tuple(
-                dict(zip(progress_properties, point.split(","), strict=False))
-                for point in row.split(";")[:-1]
-            )
-            for row in lines.several(r"(\d+) runs")
+            lines.points(row, progress_properties) for row in lines.several(r"([0-9]{1,7}) runs")
         )
+        if len(progress) != len(runs):
+            raise ValueError(f"progress of {len(progress)} runs, there are {len(runs)}")
     lines.match(r"(\.)")
     return PlannerLog(name, settings, runs, progress)
 
@@ -199,8 +193,8 @@ def format_log(log: ExperimentLog) -> str:
         *(f"{name} = {value}" for name, value in log.parameters.items()),
         f"Running on {log.host}",
         f"Starting at {log.date}",
-        *(_BLOCK_BEGIN, log.setup, _BLOCK_END),
-        *((_BLOCK_BEGIN, log.cpu, _BLOCK_END) if log.cpu else ()),
+        *(BLOCK_BEGIN, log.setup, BLOCK_END),
+        *((BLOCK_BEGIN, log.cpu, BLOCK_END) if log.cpu else ()),
         f"{log.seed} is the random seed",
         f"{log.time_limit:g} seconds per run",
         f"{log.memory_limit:g} MB per run",

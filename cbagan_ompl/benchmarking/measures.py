@@ -5,11 +5,12 @@ They are written into the log afterwards, because OMPL 2.0 hands its post-run ev
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from math import inf, isfinite
 from typing import TYPE_CHECKING
 
+from ..errors import ConfigError, show
 from .logs import GEOMETRIC, ExperimentLog, PlannerLog, number
 
 if TYPE_CHECKING:
@@ -47,6 +48,9 @@ BEST_COST = "best cost"
 
 #: Thresholds of good paths, percent above the best known cost, for which every log has a time.
 WITHIN_PERCENT = (10, 5, 2)
+
+# No time, cost or count of a benchmark is larger.
+_LARGEST = 1e300
 
 # Fractions of the time limit at which the cost is taken.
 _COST_AT = (0.1, 0.25, 0.5, 1.0)
@@ -122,6 +126,46 @@ def _add_to_planner(
         costs = cost_history(record, points, float(run[TIME]))
         runs.append({**run, **_properties(record), **_cost_properties(costs, borders, limit)})
     return replace(planner, runs=tuple(runs))
+
+
+def check_measures(log: ExperimentLog, percents: Sequence[int] = WITHIN_PERCENT) -> None:
+    """Raise unless the runs of a log have the properties that statistics and plots are made of.
+
+    Args:
+        log: from :func:`.parse_log`.
+        percents: as for :func:`add_measures`.
+
+    Raises:
+        ConfigError: a property is missing, or its number makes no sense.
+    """
+    always = (TIME, NODES, INFERENCE, LEARNED, UNIFORM, CHECKS)
+    solved = (COST, FIRST_TIME, FIRST_COST, cost_at(fixed_times(log.time_limit)[-1]))
+    any_solved = False
+    for planner in log.planners:
+        for i, run in enumerate(planner.runs):
+            of_run = f"run {i} of {planner.name}"
+            _check_numbers(of_run, run, always)
+            if run.get(SOLVED) not in ("0", "1"):
+                raise ConfigError(f"{of_run}: {SOLVED} is {show(run.get(SOLVED))}, not 0 or 1")
+            if run[SOLVED] == "1":
+                any_solved = True
+                _check_numbers(of_run, run, solved)
+            elif any(run.get(name) != "" for name in solved):
+                raise ConfigError(f"{of_run} has a cost, and no path")
+            for percent in percents:
+                if run.get(time_within(percent)) != "":
+                    _check_numbers(of_run, run, [time_within(percent)])
+            for point in planner.progress[i] if planner.progress else ():
+                _check_numbers(f"progress of {of_run}", point, [TIME])
+    if any_solved:
+        _check_numbers("the experiment", log.parameters, [BEST_KNOWN])
+
+
+def _check_numbers(place: str, values: Mapping[str, str], names: Iterable[str]) -> None:
+    for name in names:
+        value = number(values.get(name))
+        if value is None or not 0 <= value <= _LARGEST:
+            raise ConfigError(f"{place}: {name} is {show(values.get(name))}")
 
 
 def cost_history(

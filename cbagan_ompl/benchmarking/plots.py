@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ..common.figures import write_figure
+from ..common.text import one_line
 from .logs import GEOMETRIC, ExperimentLog, number
 from .measures import BEST_KNOWN, INFERENCE, NODES, logged_costs
 from .plot_styles import Panels, Style, legend_handles, styles_of
@@ -23,6 +24,9 @@ _DOTS_PER_INCH = 200
 _HEIGHT = 2.7  # of a panel, inches
 _RATIO_HEIGHT, _RATIO_ROW_HEIGHT = 0.9, 0.32
 _TIMES = 400  # points of a curve of costs
+
+# Kinds of map, of which a benchmark may have as many as maps, and characters of their names.
+_MOST_FAMILIES, _LONGEST_LABEL = 60, 40
 
 # Costs are drawn on a logarithmic axis, those nearer to the best known one at its lower end.
 _LEAST_EXCESS = 0.1
@@ -237,7 +241,8 @@ def _ratio_figure(results: Results, measure: str, label: str) -> Figure | None:
     Returns:
         None where no planner with another sampler gets there.
     """
-    groups = {"all maps": results.overall} | dict(sorted(results.families.items()))
+    families = sorted(results.families.items())[:_MOST_FAMILIES]
+    groups = {"all maps": results.overall} | dict(families)
     shown = [
         summary.planner
         for summary in results.overall
@@ -261,10 +266,14 @@ def _ratio_figure(results: Results, measure: str, label: str) -> Figure | None:
                     position = row + offsets[summary.sampler]
                     _draw_ratio(axes, summary, measure, position, styles[summary.sampler], hollow)
     panels.use_logarithm("x")
-    panels.axes[0].set_yticks(range(len(groups)), list(groups))
+    labels = [one_line(name, _LONGEST_LABEL) for name in groups]
+    panels.axes[0].set_yticks(range(len(groups)), labels)
     panels.axes[0].set_ylim(len(groups) - 0.5, -0.5)
     panels.label(x=f"ratio to {BASELINE}, below 1 is better")
     note = " (hollow: most runs of both end at the limit)" if any_hollow else ""
+    left_out = len(results.families) - len(families)
+    if left_out:
+        note += f" ({left_out} kinds of map left out)"
     panels.figure.suptitle(f"{label}, with inference{note}", fontsize=10)
     panels.add_legend(legend_handles(styles, dashed=False))
     return panels.figure

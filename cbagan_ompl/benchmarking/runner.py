@@ -5,18 +5,20 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import tempfile
 from collections.abc import Sequence
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import cast
 
 from tqdm import tqdm
 
-from ..common.parallel import fork_server
+from ..common.files import reason
+from ..common.parallel import fork_server, start_first
 from ..common.signals import interrupts_held
+from ..errors import ConfigError
 from ..planning.heatmap_sources import LEARNED
-from .worker import Job, run_job
+from .worker import Job, UnwritableLogError, run_job
 
 # Imported once, by the server from which the processes are forked.
 _PRELOAD = ("cbagan_ompl.benchmarking.worker",)
@@ -25,6 +27,12 @@ _PRELOAD_LEARNED = ("cbagan_ompl.inference.predictor", "torch")
 
 # An interrupt that another thread takes, or that comes just before a wait, does not end the wait.
 _POLL_S = 0.5
+
+# Seconds that a process has to end after SIGTERM.
+_PATIENCE_S = 1.0
+
+# Exit status of a process that could not write its log, or OMPL's.
+_CANNOT_WRITE = 74  # EX_IOERR of sysexits.h
 
 # Characters that are kept of the end of a crashed process' output.
 _OUTPUT_KEPT = 4000
@@ -43,22 +51,34 @@ def run_jobs(jobs: Sequence[Job], processes: int, show_progress: bool = True) ->
 
     Raises:
         KeyboardInterrupt: after an interrupt; the tasks that were running are terminated.
+        ConfigError: processes or temporary files cannot be made, or a log cannot be written.
     """
+    try:
+        return _run_jobs(jobs, processes, show_progress)
+    except BrokenPipeError:  # of our output
+        raise
+    except OSError as error:
+        place = f"{error.filename}: " if error.filename else ""
+        raise ConfigError(f"cannot run the tasks: {place}{reason(error)}") from error
+
+
+def _run_jobs(jobs: Sequence[Job], processes: int, show_progress: bool) -> dict[str, str]:
     waiting = list(reversed(jobs))
     running: dict[Connection, _RunningJob] = {}
     failures: dict[str, str] = {}
     rounds = sum(job.settings.runs for job in jobs)
-    bar = tqdm(total=rounds, unit="round", disable=not show_progress, dynamic_ncols=True)
+    bar = tqdm(total=rounds, unit="round", disable=not (show_progress and jobs), dynamic_ncols=True)
     # Outermost: an interrupt is raised only when no process is left that uses the folder.
-    with interrupts_held() as interrupted, bar, TemporaryDirectory() as folder:
+    with interrupts_held() as interrupted, bar, tempfile.TemporaryDirectory() as folder:
         try:
             while waiting or running:
                 while waiting and len(running) < processes:
                     started = _RunningJob(waiting.pop(), Path(folder))
+                    started.start(None if running else interrupted)
                     running[started.rounds] = started
                 ready = cast("list[Connection]", wait([*running, interrupted], _POLL_S))
                 if interrupted in ready:
-                    break
+                    raise KeyboardInterrupt
                 for pipe in ready:
                     done = running[pipe].rounds_done()
                     bar.update(done)
@@ -68,6 +88,9 @@ def run_jobs(jobs: Sequence[Job], processes: int, show_progress: bool = True) ->
             for unfinished in running.values():
                 unfinished.process.terminate()
             for unfinished in running.values():
+                # Where SIGTERM is ignored, as after "trap '' TERM", children ignore it as well.
+                unfinished.process.join(_PATIENCE_S)
+                unfinished.process.kill()
                 unfinished.join()
     return failures
 
@@ -76,6 +99,8 @@ def _finish(ended: _RunningJob, failures: dict[str, str], bar: tqdm[None]) -> No
     name = ended.job.task.name
     output = ended.join()
     bar.update(ended.rounds_left)
+    if ended.process.exitcode == _CANNOT_WRITE:
+        raise ConfigError(output)
     if output:
         failures[name] = output
         bar.write(f"task {name} failed: {output.splitlines()[-1]}", sys.stderr)
@@ -98,10 +123,17 @@ class _RunningJob:
         self.rounds_left = job.settings.runs
         self._output = folder / job.task.name
         self._output.touch()
-        self.rounds, writer = context.Pipe(duplex=False)
-        self.process = context.Process(target=_work, args=(job, writer, self._output), daemon=True)
-        self.process.start()
-        writer.close()  # the process holds its own copy, whose end is the end of the pipe
+        self.rounds, self._writer = context.Pipe(duplex=False)
+        arguments = (job, self._writer, self._output)
+        self.process = context.Process(target=_work, args=arguments, daemon=True)
+
+    def start(self, interrupted: Connection | None) -> None:
+        """Start the process; an interrupt is waited for with the first one only."""
+        with self._writer:  # the process holds its own copy, whose end is the end of the pipe
+            if interrupted is None:
+                self.process.start()
+            else:
+                start_first(self.process, interrupted)
 
     def rounds_done(self) -> int:
         """Return 1 for a round that is done, 0 when the process has ended."""
@@ -122,6 +154,8 @@ class _RunningJob:
         for unfinished in self.job.log.parent.glob(f"{self.job.log.name}.*"):
             unfinished.unlink()
         output = self._output.read_text(encoding="utf-8", errors="replace")
+        if code == _CANNOT_WRITE:
+            return output.strip() or f"cannot write {self.job.log}"
         end = f"ended by {signal.Signals(-code).name}" if code < 0 else ""
         return f"{output[-_OUTPUT_KEPT:]}\n{end}".strip() or f"exit status {code}"
 
@@ -131,4 +165,14 @@ def _work(job: Job, rounds: Connection, output: Path) -> None:
     with output.open("wb") as file:
         for stream in (1, 2):
             os.dup2(file.fileno(), stream)
-    run_job(job, lambda: rounds.send_bytes(b"."))
+    # OMPL's own logs lie there: they go with the folder, however this process ends.
+    tempfile.tempdir = str(output.parent)
+    try:
+        run_job(job, lambda: rounds.send_bytes(b"."))
+    except UnwritableLogError as error:
+        print(error, flush=True)
+    except OSError as error:
+        print(f"{error.filename}: {reason(error)}", flush=True)
+    else:
+        return
+    raise SystemExit(_CANNOT_WRITE)

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from pathlib import Path
 from typing import Any
 
-import yaml
-
-from ..common.files import read_text, write_json
-from ..common.validation import check_at_least, positive_number, whole_number
-from ..errors import ConfigError
+from ..common.validation import is_finite_number, positive_number, whole_number
+from ..common.yaml_text import parse_yaml
+from ..errors import ConfigError, show
 from ..planning.heatmap_sources import LEARNED, UNIFORM
 from ..sampling.options import SamplerOptions
 
@@ -21,6 +19,13 @@ BASELINE = UNIFORM
 
 #: By default a path is good once its cost is within so many percent of the best known one.
 DEFAULT_WITHIN = 5
+
+#: Most runs of all planners on one task, whose log is kept in memory at the end; longest time
+#: limit, a day in seconds; largest threshold of a good path, percent.
+MAX_RUNS, MAX_TIME, MAX_WITHIN = 5000, 86400, 10_000
+
+# They name planners in OMPL's logs and series in plots, where a leading "_" would hide them.
+_SAMPLER_NAME = re.compile(r"[^\W_].{0,39}")
 
 
 @dataclass(frozen=True)
@@ -69,20 +74,29 @@ class Settings:
     def __post_init__(self) -> None:
         for what, names in (("planners", self.planners), ("samplers", self.samplers)):
             if not names or len(set(names)) < len(names):
-                raise ConfigError(f"{what} must be named, and each once, got {', '.join(names)!r}")
-        check_at_least("runs", self.runs, 1)
-        positive_number("time", self.time)
+                raise ConfigError(f"{what} must be named, and each once, got {show(list(names))}")
+        for name in self.samplers:
+            _check_sampler_name(name)
+        whole_number("runs", self.runs, 1)
+        variants = len(self.planners) * len(self.samplers)
+        if self.runs * variants > MAX_RUNS:
+            raise ConfigError(
+                f"{show(self.runs)} runs of {variants} planners with samplers are more than the "
+                f"{MAX_RUNS} that a task may have: do fewer runs, on more tasks"
+            )
+        if positive_number("time", self.time) > MAX_TIME:
+            raise ConfigError(f"time is at most {MAX_TIME} s, got {show(self.time)}")
         if self.range is not None:
             positive_number("range", self.range)
         seed = self.sampler_options.seed
         if not isinstance(seed, int):
-            raise ConfigError(f"the seed of a benchmark must be an int, got {seed!r}")
-        check_at_least("seed", seed, 0)
-        whole_number("within", self.within, 1)
+            raise ConfigError(f"the seed of a benchmark must be an int, got {show(seed)}")
+        whole_number("seed", seed, 0)
+        whole_number("within", self.within, 1, MAX_WITHIN)
         for planner in self.parameters:
             if planner not in self.planners:
                 raise ConfigError(
-                    f"a parameter of {planner} is set, which is not among the planners "
+                    f"a parameter of {show(planner)} is set, which is not among the planners "
                     f"{', '.join(self.planners)}"
                 )
 
@@ -108,17 +122,13 @@ class Settings:
                 saved[name] = getattr(self, name)
         return json.loads(json.dumps(saved))  # type: ignore[no-any-return]
 
-    def save(self, path: Path) -> None:
-        """Write the settings as JSON.
 
-        Raises:
-            ConfigError: the file cannot be written.
-        """
-        write_json(path, self.to_dict())
-
-    def is_saved_in(self, path: Path) -> bool:
-        """Return whether a file that :meth:`save` wrote holds the same settings."""
-        return bool(json.loads(read_text(path, ConfigError)) == self.to_dict())
+def _check_sampler_name(name: str) -> None:
+    if not (_SAMPLER_NAME.fullmatch(name) and name.isprintable()):
+        raise ConfigError(
+            "the name of a sampler has up to 40 printable characters and begins with a letter or "
+            f"digit, got {show(name)}"
+        )
 
 
 def parse_parameters(assignments: list[str]) -> dict[str, dict[str, Any]]:
@@ -136,6 +146,12 @@ def parse_parameters(assignments: list[str]) -> dict[str, dict[str, Any]]:
         key, equals, text = assignment.partition("=")
         planner, dot, name = key.partition(".")
         if not (planner and dot and name and equals):
-            raise ConfigError(f"expected PLANNER.parameter=value, got {assignment!r}")
-        parameters.setdefault(planner, {})[name] = yaml.safe_load(text)
+            raise ConfigError(f"expected PLANNER.parameter=value, got {show(assignment)}")
+        value = parse_yaml(text, f"--set {show(key)}", ConfigError)
+        if not isinstance(value, bool | str) and not is_finite_number(value):
+            raise ConfigError(
+                f"--set {show(key)}: the value is a finite number, true, false or a word, got "
+                f"{show(value)}"
+            )
+        parameters.setdefault(planner, {})[name] = value
     return parameters

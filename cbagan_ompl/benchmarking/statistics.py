@@ -110,7 +110,11 @@ def _total_time(name: str) -> _Reader:
 def _relative_cost(name: str) -> _Reader:
     def read(run: Mapping[str, str], log: ExperimentLog) -> _Value:
         cost = number(run[name])
-        return (inf, True) if cost is None else (cost / float(log.parameters[BEST_KNOWN]), False)
+        if cost is None:
+            return inf, True
+        best = float(log.parameters[BEST_KNOWN])
+        # A path without length is the best one where the start lies in the goal region.
+        return (1.0 if cost == best else cost / best if best else inf), False
 
     return read
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +13,8 @@ from zlib import crc32
 
 import numpy as np
 
-from ..common.validation import check_at_least
+from ..common.text import one_line
+from ..common.validation import whole_number
 from ..errors import ConfigError, HeatmapError, TaskError
 from ..maps.grid_map import GridMap
 from ..maps.loading import BUNDLED, bundled_maps
@@ -21,6 +24,11 @@ from ..sampling.heatmap import Heatmap
 # Start and goal of a random task are at least this fraction of the map's longer side apart.
 _LEAST_DISTANCE = 0.5
 _RANDOM_TASKS = 4
+
+#: Most tasks of a benchmark.
+MAX_TASKS = 10_000
+
+_LONGEST_NAME = 100  # of a map, in names of files
 _MAX_TRIES = 1000
 
 
@@ -39,9 +47,14 @@ class BenchmarkTask:
     task: Task
 
     @property
+    def map_name(self) -> str:
+        """The map's name as part of a file's: letters, digits, ``_.-``, at most 100 characters."""
+        return one_line(re.sub("[^A-Za-z0-9_.-]", "_", self.grid.name), _LONGEST_NAME)
+
+    @property
     def name(self) -> str:
         """``MAP_NUMBER``: the name of logs and heat maps of the task."""
-        return f"{re.sub(r'[^A-Za-z0-9_.-]', '_', self.grid.name)}_{self.number}"
+        return f"{self.map_name}_{self.number}"
 
 
 def select_tasks(
@@ -69,7 +82,7 @@ def select_tasks(
         ConfigError: two maps of one name, or an option that makes no sense.
     """
     if tasks_per_map is not None:
-        check_at_least("tasks per map", tasks_per_map, 1)
+        whole_number("tasks per map", tasks_per_map, 1, MAX_TASKS)
     selected = []
     for path in maps or [BUNDLED + name for name in bundled_maps()]:
         grid = GridMap.load(path, **(map_options or {})).inflated(radius)
@@ -83,10 +96,17 @@ def select_tasks(
             except TaskError as error:
                 raise TaskError(f"task {number} of {grid.name}: {error}") from error
             selected.append(BenchmarkTask(grid, number, task))
-    names = [task.name for task in selected]
-    if len(set(names)) < len(names):
-        twice = sorted({name for name in names if names.count(name) > 1})
-        raise ConfigError(f"maps must have different names, there are two {twice[0]}")
+    if len(selected) > MAX_TASKS:
+        raise ConfigError(
+            f"a benchmark has at most {MAX_TASKS} tasks, these are {len(selected)}; choose some "
+            "of each map with --tasks-per-map"
+        )
+    name, count = Counter(task.name for task in selected).most_common(1)[0]
+    if count > 1:
+        raise ConfigError(
+            f"maps must have different names, there are two {name} (characters other than letters, "
+            "digits, '_', '.' and '-' count as '_')"
+        )
     return selected
 
 
@@ -111,17 +131,21 @@ def random_tasks(grid: GridMap, count: int, seed: int) -> list[Task]:
     Raises:
         TaskError: the map has none or too few such pairs of pixels.
     """
-    rng = np.random.default_rng((seed, crc32(grid.name.encode()), crc32(grid.cells)))
+    name = grid.name.encode(errors="surrogateescape")
+    rng = np.random.default_rng((seed, crc32(name), crc32(grid.cells)))
     rows, columns = np.nonzero(grid.free)
     points = grid.to_world(np.stack((columns, rows), -1) + 0.5)
     labels = grid.components[rows, columns]
     least = _LEAST_DISTANCE * max(grid.shape) * grid.resolution
     tasks: list[Task] = []
-    for _ in range(_MAX_TRIES * count):
+    tries = 0
+    while tries < _MAX_TRIES * _RANDOM_TASKS:  # since the last task that was found
+        tries += 1
         i, j = rng.integers(len(points), size=2)
         if labels[i] == labels[j] and np.hypot(*(points[i] - points[j])) >= least:
             (x0, y0), (x1, y1) = points[i].tolist(), points[j].tolist()
             tasks.append(Task((x0, y0), (x1, y1)))
+            tries = 0
         if len(tasks) == count:
             return tasks
     raise TaskError(
@@ -130,18 +154,27 @@ def random_tasks(grid: GridMap, count: int, seed: int) -> list[Task]:
     )
 
 
-def heatmap_file(folder: str, task: BenchmarkTask) -> Heatmap:
-    """Return the heat map of a task from a folder: ``MAP_NUMBER.npy`` or ``MAP_NUMBER.png``.
+def heatmap_path(folder: str, task: BenchmarkTask) -> Path:
+    """Return the file of the heat map of a task: ``MAP_NUMBER.npy`` or ``MAP_NUMBER.png``.
 
     Args:
         folder: folder of the heat maps.
         task: the task.
 
     Raises:
-        HeatmapError: there is none, or it does not fit the map of the task.
+        HeatmapError: there is none.
     """
     files = [Path(folder) / f"{task.name}{suffix}" for suffix in (".npy", ".png")]
     for file in files:
-        if file.is_file():
-            return Heatmap.load(file, task.grid)
+        if os.path.isfile(file):
+            return file
     raise HeatmapError(f"no heat map of the task: neither {files[0]} nor {files[1].name}")
+
+
+def heatmap_file(folder: str, task: BenchmarkTask) -> Heatmap:
+    """Return the heat map of a task from a folder; arguments as for :func:`heatmap_path`.
+
+    Raises:
+        HeatmapError: there is none, or it does not fit the map of the task.
+    """
+    return Heatmap.load(heatmap_path(folder, task), task.grid)

@@ -8,12 +8,13 @@ from pathlib import Path
 from zlib import crc32
 
 from ..common.files import write_atomically
-from ..errors import ConfigError
+from ..common.text import one_line
+from ..errors import ConfigError, show
 from ..planning.heatmap_sources import LEARNED, SAMPLERS, HeatmapSource, heatmap_source
 from ..planning.ompl_benchmark import PlannerVariant, RunOptions, check_variants, run_benchmark
 from ..sampling.heatmap import Heatmap
-from .logs import ExperimentLog, concatenate_logs, format_log, parse_log
-from .measures import FAMILY, MAP, add_measures, thresholds
+from .logs import GEOMETRIC, ExperimentLog, concatenate_logs, format_log, parse_log
+from .measures import FAMILY, MAP, add_measures, check_measures, thresholds
 from .settings import Settings
 from .tasks import BenchmarkTask, heatmap_file
 
@@ -57,12 +58,20 @@ def check_heatmaps(job: Job) -> None:
         heatmap_file(folder, job.task)
 
 
+class UnwritableLogError(ConfigError):
+    """A log that cannot be written, as on a full disk: the next one could not be either."""
+
+
 def run_job(job: Job, after_round: Callable[[], None]) -> None:
     """Run a task and write its log, whole or not at all.
 
     Args:
         job: the task.
         after_round: called after each round of runs.
+
+    Raises:
+        UnwritableLogError: the log cannot be written.
+        CbaganOmplError: as for :func:`check_job`.
     """
     grid, task = job.task.grid, job.task.task
     endpoints = grid.check_task(task.start, task.goal)
@@ -73,7 +82,50 @@ def run_job(job: Job, after_round: Callable[[], None]) -> None:
     log = add_measures(
         _add_task(log, job), recording.runs, task.optimal_cost, thresholds(job.settings.within)
     )
-    write_atomically(job.log, format_log(log))
+    text = format_log(log)
+    check_log(parse_log(text), job)  # what cannot be read again is better not written
+    write_atomically(job.log, text, UnwritableLogError)
+
+
+def check_log(log: ExperimentLog, job: Job) -> None:
+    """Raise unless a log is that of a task, with all measures of all runs.
+
+    Args:
+        log: from :func:`.parse_log`.
+        job: the task.
+
+    Raises:
+        ConfigError: something else was run, or a measure is missing or makes no sense.
+    """
+    settings = job.settings
+    wanted = {
+        "name": job.task.name,
+        "runs": settings.runs,
+        "time limit": f"{settings.time:g}",
+        "planners": [
+            f"{GEOMETRIC}{planner}_{sampler}"
+            for planner in settings.planners
+            for sampler in settings.samplers
+        ],
+        **_task_parameters(job),
+    }
+    found = {
+        "name": log.name,
+        "runs": log.runs,
+        "time limit": f"{log.time_limit:g}",
+        "planners": [planner.name for planner in log.planners],
+        **log.parameters,
+    }
+    for name, value in wanted.items():
+        if found.get(name) != value:
+            raise ConfigError(
+                f"the log of {job.task.name} is that of something else: {name} is "
+                f"{show(found.get(name))} there, where {show(value)} is wanted"
+            )
+    try:
+        check_measures(log, thresholds(settings.within))
+    except ConfigError as error:
+        raise ConfigError(f"the log of {job.task.name} is damaged: {error}") from error
 
 
 def _options(job: Job) -> RunOptions:
@@ -115,19 +167,19 @@ def _source(job: Job, sampler: str) -> HeatmapSource | None:
 
 
 def _add_task(log: ExperimentLog, job: Job) -> ExperimentLog:
+    return replace(log, parameters={**log.parameters, **_task_parameters(job)})
+
+
+def _task_parameters(job: Job) -> dict[str, str]:
     (start_x, start_y), (goal_x, goal_y) = job.task.task.start, job.task.task.goal
-    return replace(
-        log,
-        parameters={
-            **log.parameters,
-            MAP: job.task.grid.name,
-            # A map without a kind forms a group by itself.
-            FAMILY: job.task.task.family or job.task.grid.name,
-            "task INTEGER": str(job.task.number),
-            "start_x REAL": f"{start_x:.9g}",
-            "start_y REAL": f"{start_y:.9g}",
-            "goal_x REAL": f"{goal_x:.9g}",
-            "goal_y REAL": f"{goal_y:.9g}",
-            "goal_tolerance REAL": f"{job.task.grid.resolution:.9g}",
-        },
-    )
+    return {
+        MAP: one_line(job.task.grid.name),
+        # A map without a kind forms a group by itself.
+        FAMILY: one_line(job.task.task.family or job.task.grid.name),
+        "task INTEGER": str(job.task.number),
+        "start_x REAL": f"{start_x:.9g}",
+        "start_y REAL": f"{start_y:.9g}",
+        "goal_x REAL": f"{goal_x:.9g}",
+        "goal_y REAL": f"{goal_y:.9g}",
+        "goal_tolerance REAL": f"{job.task.grid.resolution:.9g}",
+    }

@@ -14,6 +14,7 @@ from ..common.files import reason
 from ..common.outputs import check_output
 from ..common.signals import Terminated
 from ..errors import CbaganOmplError
+from .parser import Parser
 
 #: Exit statuses beside 0 and 1: bad input, and what is our own fault (EX_SOFTWARE of sysexits.h).
 BAD_INPUT, INTERNAL_ERROR = 2, 70
@@ -31,10 +32,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
         an error of this package's own, 130 interrupted, 141 nobody reads the output, 143
         terminated.
     """
+    return execute(parse(arguments))
+
+
+def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
+    """Return the parsed arguments of the command line; arguments as for :func:`main`.
+
+    Raises:
+        SystemExit: help was asked for, or the arguments make no sense.
+    """
+    parser = _make_parser()
+    return parser.parse_args(_bind_points(sys.argv[1:] if arguments is None else arguments))
+
+
+def execute(args: argparse.Namespace) -> int:
+    """Run a command.
+
+    Args:
+        args: from :func:`parse`.
+
+    Returns:
+        The exit status, as of :func:`main`.
+    """
     # Figures are files: whatever backend a notebook or a screen asks for may not be there.
     os.environ["MPLBACKEND"] = "agg"
-    parser = _make_parser()
-    args = parser.parse_args(_bind_points(sys.argv[1:] if arguments is None else arguments))
     try:
         check_output(getattr(args, "json", None), _inputs(args), force=_forces(args))
         return int(args.run(args))
@@ -55,6 +76,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return status
 
 
+<<<<<<< HEAD
 def load_commands() -> None:
     """Import what the commands need, which takes a second: not done with this module.
 
@@ -65,6 +87,8 @@ def load_commands() -> None:
     from . import benchmark, dataset, evaluate, plan, train  # noqa: F401
 
 
+=======
+>>>>>>> main
 def _explain(error: Exception) -> tuple[int, str]:
     """Return the exit status of an error, and what to say of it."""
     if isinstance(error, CbaganOmplError):
@@ -89,10 +113,13 @@ _INPUT_ARGUMENTS = (
     "path",
     "config",
     "inception",
+    "start_from",
 )
 
 # What a full or protected disk, and not a mistake of ours, is the cause of.
-_OF_THE_SYSTEM = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO}
+_OF_THE_SYSTEM = {
+    *(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO),
+}
 
 
 def _bind_points(arguments: Sequence[str]) -> list[str]:
@@ -107,15 +134,14 @@ def _bind_points(arguments: Sequence[str]) -> list[str]:
 
 
 def _make_parser() -> argparse.ArgumentParser:
+    # Here, because they load much: until then Ctrl-C has to end the process without a word more.
     from .benchmark import add_benchmark_parser
     from .dataset import add_dataset_parser
     from .evaluate import add_evaluate_parser
     from .plan import add_plan_parser
     from .train import add_export_parser, add_train_parser
 
-    parser = argparse.ArgumentParser(
-        prog="cbagan-ompl", description="A learned state sampler for OMPL's planners."
-    )
+    parser = Parser(prog="cbagan-ompl", description="A learned state sampler for OMPL's planners.")
     parser.add_argument("--version", action="version", version=f"cbagan-ompl {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     add_plan_parser(commands)

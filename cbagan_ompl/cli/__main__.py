@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import sys
 from types import FrameType
 
-from ..common.signals import Terminated, handle_endings, raise_once
-from . import INTERRUPTED, TERMINATED, load_commands, main
+from ..common.signals import handle_endings, raise_once
 
 
 def run() -> None:
     """Run the command line as a process of its own, which Ctrl-C and SIGTERM may end any time."""
     handle_endings(_end_at_once)
-    load_commands()  # nothing is open yet, nothing to clean up
+    from . import INTERRUPTED, TERMINATED, execute, parse
+
+    args = parse()  # loads what the commands need: nothing is open yet, nothing to clean up
     handle_endings(raise_once)
-    try:
-        status = main()
-    except KeyboardInterrupt as error:  # while the command line was parsed
-        status = TERMINATED if isinstance(error, Terminated) else INTERRUPTED
+    status = execute(args)
     handle_endings(_end_at_once)
     try:
         sys.stdout.flush()
@@ -26,6 +25,10 @@ def run() -> None:
         print(f"cbagan-ompl: cannot write the output: {error.strerror}", file=sys.stderr)
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         status = status or 2
+    if status in (INTERRUPTED, TERMINATED):
+        # The interpreter would take a second and more to free what torch has loaded.
+        atexit._run_exitfuncs()
+        os._exit(status)
     sys.exit(status)
 
 

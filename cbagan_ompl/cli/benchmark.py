@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from ..benchmarking.settings import Settings, parse_parameters
-from ..common.validation import check_at_least
-from ..errors import ConfigError
+from ..common.text import one_line
+from ..common.validation import whole_number
+from ..errors import ConfigError, show
 from ..maps.loading import bundled_maps
 from ..planning.heatmap_sources import LEARNED
 from .options import (
@@ -21,6 +22,9 @@ from .options import (
     map_options,
     sampler_options,
 )
+
+# Tasks that run at a time, and characters that a report shows of the command.
+_MOST_JOBS, _LONGEST_COMMAND = 1024, 20_000
 
 _HELP = """\
 Compare samplers in OMPL's own planners, with OMPL's Benchmark, on the same tasks.
@@ -50,8 +54,8 @@ def add_benchmark_parser(commands: Any) -> None:
         help="compare samplers on many tasks",
         description=_HELP.format(maps=", ".join(bundled_maps())),
         formatter_class=argparse.RawDescriptionHelpFormatter,
-        fromfile_prefix_chars="@",
     )
+    parser.reads_files = True
     parser.set_defaults(run=_benchmark)
     parser.add_argument("maps", nargs="*", metavar="MAP", help="map file, or bundled:NAME")
 
@@ -176,14 +180,14 @@ def _names(text: str) -> tuple[str, ...]:
 
 def _named_folder(text: str) -> tuple[str, str]:
     name, _, folder = text.partition("=")
-    if not name or not Path(folder).is_dir() or not folder:
-        raise argparse.ArgumentTypeError(f"expected NAME=DIR with a folder DIR, got {text!r}")
+    if not (name and folder and os.path.isdir(folder)):
+        raise argparse.ArgumentTypeError(f"expected NAME=DIR with a folder DIR, got {show(text)}")
     return name, folder
 
 
 def _model(text: str) -> tuple[str, str]:
     name, equals, file = text.partition("=")
-    return (name, file) if equals and not Path(text).exists() else (LEARNED, text)
+    return (name, file) if equals and not os.path.exists(text) else (LEARNED, text)
 
 
 def _cores() -> int:
@@ -216,7 +220,7 @@ def _benchmark(args: argparse.Namespace) -> int:
     from ..benchmarking.benchmark import Benchmark, write_results
     from ..benchmarking.tasks import select_tasks
 
-    check_at_least("jobs", args.jobs, 1)
+    whole_number("jobs", args.jobs, 1, _MOST_JOBS)
     if args.jobs > _cores():
         print(
             f"warning: {args.jobs} jobs share {_cores()} cores, all times will be too long",
@@ -228,8 +232,8 @@ def _benchmark(args: argparse.Namespace) -> int:
     )
     benchmark = Benchmark(tasks, settings, Path(args.output), args.resume)
     failures = benchmark.run(args.jobs)
-    logs = benchmark.finished_logs()
+    logs = benchmark.finished_logs(failures)
     if logs:
-        command = shlex.join(["cbagan-ompl", *sys.argv[1:]])
+        command = one_line(shlex.join(["cbagan-ompl", *sys.argv[1:]]), _LONGEST_COMMAND)
         print(write_results(logs, settings, failures, benchmark.folder, command))
     return 1 if failures else 0

@@ -7,14 +7,19 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..common.files import make_folder, write_atomically, write_json
-from ..common.outputs import write_report
+from ..common.files import make_folder, write_atomically
+from ..common.outputs import check_output, write_report
 from ..common.validation import check_at_least
-from ..errors import ConfigError
+from ..errors import ConfigError, show
 
 if TYPE_CHECKING:
     from ..datasets.dataset import Tasks
     from ..evaluation.evaluator import Evaluation
+
+_TABLE, _RESULT = "evaluation.md", "evaluation.json"
+
+# It is part of the name of a file.
+_MAX_NAME_LENGTH = 100
 
 _HELP = """\
 Score models on the tasks of a training set, next to trivial baselines.
@@ -96,7 +101,7 @@ def _evaluate(args: argparse.Namespace) -> int:
     baselines = trivial_baselines(tasks)
     _check_names([*names, *baselines])
     if args.output is not None:
-        make_folder(Path(args.output))
+        _check_outputs(Path(args.output), names, stored, args)
     features, frechet_name = region_features, REGION_GRID_NAME
     if args.inception is not None:
         features, frechet_name = partial(inception_features, path=args.inception), INCEPTION_NAME
@@ -131,7 +136,7 @@ def _evaluate(args: argparse.Namespace) -> int:
 def _parse_predictions(text: str) -> tuple[str, Path]:
     name, _, folder = text.partition("=")
     if not name or not folder:
-        raise ConfigError(f"--predictions takes NAME=DIR, got {text!r}")
+        raise ConfigError(f"--predictions takes NAME=DIR, got {show(text)}")
     return name, Path(folder)
 
 
@@ -141,11 +146,32 @@ def _check_names(names: list[str]) -> None:
         raise ConfigError(f"two predictions are called {', '.join(sorted(repeated))!r}")
     for name in names:
         # It names a file, and a row of a table.
-        if any(character in name for character in "/\\|\n\0"):
+        if (
+            any(character in name for character in "/\\|")
+            or not name.isprintable()
+            or not 0 < len(name) <= _MAX_NAME_LENGTH
+        ):
             raise ConfigError(
-                f"a prediction cannot be called {name!r}; "
-                "choose a name without slashes, bars and line breaks"
+                f"a prediction cannot be called {show(name)}; choose a name of at most "
+                f"{_MAX_NAME_LENGTH} characters without slashes, bars and line breaks"
             )
+
+
+def _check_outputs(
+    folder: Path, names: list[str], stored: list[tuple[str, Path]], args: argparse.Namespace
+) -> None:
+    """Make the folder of the results; raise if a file in it would be lost, before any work."""
+    for source in (args.dataset, *(source for _, source in stored)):
+        if folder.exists() and folder.samefile(source):
+            raise ConfigError(f"cannot write to {folder}: it is what the command reads")
+    if folder.is_dir():
+        inputs = [*(args.model or []), *([args.inception] if args.inception else [])]
+        for name in (_RESULT, *(f"{name}.png" for name in names)):
+            check_output(str(folder / name), inputs, force=args.force)
+        # The table does not say what wrote it; its result is ours, if there is one.
+        is_ours = (folder / _RESULT).exists()
+        check_output(str(folder / _TABLE), inputs, force=args.force or is_ours)
+    make_folder(folder)
 
 
 def _save(
@@ -153,7 +179,7 @@ def _save(
 ) -> None:
     from ..evaluation.sample_grid import save_sample_grid
 
-    write_atomically(folder / "evaluation.md", table)
-    write_json(folder / "evaluation.json", result)
+    write_atomically(folder / _TABLE, table)
+    write_report(str(folder / _RESULT), result)
     for evaluation in evaluations:
         save_sample_grid(evaluation, tasks, folder / f"{evaluation.name}.png")

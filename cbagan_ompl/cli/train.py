@@ -7,13 +7,15 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 from ..common.outputs import write_report
-from ..common.validation import check_at_least, require_torch
+from ..common.validation import require_torch, whole_number
 from ..datasets.dataset import load_dataset
 from ..datasets.synthetic import HARD_DETOUR, TASKS_PER_MAP, SyntheticSettings
 from ..errors import ConfigError
 from ..networks.config import NETWORKS
 from ..training.config import PRESETS, TrainingConfig
 from ..training.task_sources import DatasetSource, SyntheticSchedule, TaskSource, synthetic_source
+
+_MAX_THREADS = 4096
 
 _TRAIN_HELP = """\
 Train the networks on a data set or on synthetic maps, and keep the best epoch.
@@ -37,7 +39,8 @@ _EXPORT_HELP = """\
 Turn a training checkpoint into a model file that `plan --model` takes.
 
 Beside the model go a model card (.md) and its SHA-256 in manifest.json. Scores on the test tasks
-are in the card once the training run has come to its end.
+are in the card once the training run has come to its end. Files of these names that an export wrote
+are replaced, others only with --force.
 """
 
 
@@ -58,7 +61,9 @@ def add_train_parser(subparsers: Any) -> None:
     _add_synthetic_options(parser.add_argument_group("with --synthetic"))
     parser.add_argument("--output", required=True, metavar="DIR", help="folder for the run's files")
     parser.add_argument(
-        "--resume", action="store_true", help="go on from last.pt in the output folder"
+        "--resume",
+        action="store_true",
+        help="go on from last.pt in the output folder, or begin if it is not there yet",
     )
     parser.add_argument(
         "--start-from",
@@ -162,7 +167,7 @@ def _recipe(args: argparse.Namespace) -> TrainingConfig:
 def _train(args: argparse.Namespace) -> int:
     config = _recipe(args)
     if args.threads is not None:
-        check_at_least("--threads", args.threads, 1)
+        whole_number("--threads", args.threads, 1, _MAX_THREADS)
     if args.synthetic == (args.dataset is not None):
         raise ConfigError("tasks come from a DATASET or from --synthetic: give one of both")
     require_torch()
@@ -227,7 +232,9 @@ def _export(args: argparse.Namespace) -> int:
     require_torch()
     from ..training.export import export
 
-    record = export(args.checkpoint, args.output, note=args.note)
+    record = export(
+        args.checkpoint, args.output, note=args.note, force=getattr(args, "force", False)
+    )
     print(
         f"{args.output}: {record['parameters']:,} parameters, epoch {record['epoch']}, "
         f"validation IoU {record['metrics']['validation']['iou']:.3f}"

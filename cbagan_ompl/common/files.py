@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from ..errors import CbaganOmplError, ConfigError, MapError
+from ..errors import CbaganOmplError, ConfigError, MapError, show
 
 
 def reason(error: BaseException) -> str:
@@ -27,6 +27,18 @@ MAX_BYTES = 2**30
 
 #: Largest text file that is parsed line by line or as a tree, in bytes.
 MAX_TEXT_BYTES = 2**26
+
+
+def as_path(path: str | os.PathLike[str], error_class: type[CbaganOmplError] = ConfigError) -> Path:
+    """Return a path as a :class:`~pathlib.Path`.
+
+    Raises:
+        CbaganOmplError: of the class that is given; it is none.
+    """
+    try:
+        return Path(path)
+    except Exception as error:  # whatever the class of the value raises
+        raise error_class(f"a path is a text or a pathlib.Path, got {show(path)}") from error
 
 
 def read_bytes(

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import active_children, forkserver, get_context, resource_tracker
+from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerContext
+from multiprocessing.process import BaseProcess
+from threading import Thread
 from typing import Any, TypeVar
 
 from tqdm import tqdm
@@ -16,6 +20,9 @@ from ..errors import DatasetError
 from .signals import interrupts_held
 
 T = TypeVar("T")
+
+# Seconds between two looks for an interrupt, and that a process has to start after one.
+_POLL_S, _PATIENCE_S = 0.05, 0.3
 
 
 def fork_server(preload: Sequence[str] = ()) -> ForkServerContext:
@@ -38,6 +45,75 @@ def fork_server(preload: Sequence[str] = ()) -> ForkServerContext:
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
     return context
+
+
+def prepare_worker() -> None:
+    """Let SIGTERM end this process at work, but not while it sends a result: an initializer.
+
+    Of half a result the process that reads it would wait for the rest without end.
+    """
+    signal.signal(signal.SIGTERM, _end_unless_sending)
+
+
+def run_call(work: Callable[..., T], *arguments: Any) -> T:
+    """Return the result of a call in a process that :func:`prepare_worker` has prepared."""
+    _state.is_working = True
+    if _state.is_ending:
+        os._exit(1)
+    try:
+        return work(*arguments)
+    finally:
+        _state.is_working = False
+
+
+class _WorkerState:
+    """What the signal handler of a worker process needs to know."""
+
+    is_working = is_ending = False
+
+
+_state = _WorkerState()
+
+
+def _end_unless_sending(*_: object) -> None:
+    _state.is_ending = True
+    if _state.is_working:
+        os._exit(1)
+
+
+def start_first(process: BaseProcess, interrupted: Connection) -> None:
+    """Start the first process of a server, without waiting for the server after an interrupt.
+
+    It answers once it has imported everything, which takes seconds for torch.
+
+    Args:
+        process: of :func:`fork_server`; no other one of this server is running.
+        interrupted: from :func:`.signals.interrupts_held`.
+
+    Raises:
+        KeyboardInterrupt: an interrupt came first; the server is ended.
+    """
+    errors: list[BaseException] = []
+
+    def start() -> None:
+        try:
+            process.start()
+        except BaseException as error:
+            errors.append(error)
+
+    thread = Thread(target=start, daemon=True)
+    thread.start()
+    while thread.is_alive() and not interrupted.poll():
+        thread.join(_POLL_S)
+    thread.join(_PATIENCE_S)
+    if thread.is_alive():
+        server = getattr(forkserver.ensure_running, "__self__", None)
+        pid = getattr(server, "_forkserver_pid", None)
+        if pid:
+            os.kill(pid, signal.SIGKILL)
+        raise KeyboardInterrupt
+    if errors:
+        raise errors[0]
 
 
 def run_all(
@@ -65,10 +141,12 @@ def run_all(
     others = set(active_children())
     with interrupts_held():
         context = fork_server()
-    with ProcessPoolExecutor(processes, context) as pool:
+    with ProcessPoolExecutor(processes, context, prepare_worker) as pool:
         try:
             with interrupts_held():  # submitting starts the processes
-                positions = {pool.submit(work, *args): i for i, args in enumerate(arguments)}
+                positions = {
+                    pool.submit(run_call, work, *args): i for i, args in enumerate(arguments)
+                }
             done = as_completed(positions)
             for future in tqdm(done, total=len(positions), unit=f" {unit}", disable=not progress):
                 results[positions[future]] = future.result()

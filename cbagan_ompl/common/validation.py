@@ -63,6 +63,21 @@ def whole_number(name: str, value: SupportsIndex, least: int, most: int = 2**63)
     return number
 
 
+def truth_value(name: str, value: bool) -> bool:
+    """Return a truth value as a bool.
+
+    Args:
+        name: of the option, for the message.
+        value: a bool, NumPy's included.
+
+    Raises:
+        ConfigError: the value is none.
+    """
+    if not isinstance(value, bool | np.bool_):
+        raise ConfigError(f"{name} is True or False, got {show(value)}")
+    return bool(value)
+
+
 def check_at_least(name: str, value: int, least: int) -> None:
     """Raise if a number is too small.
 
@@ -110,7 +125,7 @@ def require(package: str, extra: str) -> None:
     """
     try:
         import_module(package)
-    except ImportError as error:
+    except (ImportError, OSError) as error:  # OSError for a library that is not there
         raise MissingDependencyError(
             f"this needs {package}, which cannot be imported ({error}); "
             f"install it with: pip install 'cbagan-ompl[{extra}]'"

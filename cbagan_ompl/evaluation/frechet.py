@@ -10,6 +10,7 @@ network, which this package does not have, but reads from a file. Without them t
 from __future__ import annotations
 
 from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import cv2
@@ -113,26 +114,35 @@ def inception_features(
         ModelError: the file is no such network.
     """
     from ..common.validation import require_torch
-    from ..inference.model_files import load_script
+    from ..inference.model_files import load_script, read_script
+    from ..inference.probe import Kind, try_model
 
     require_torch()
     import torch
 
+    expected = "it must be a TorchScript file that maps uint8 images (B, 3, 299, 299) to (B, F)"
     try:
-        network = load_script(path)
+        script = read_script(Path(path))
+        try_model(str(path), script, Kind.INCEPTION, 299)
+    except ModelError as error:
+        raise ModelError(f"{error}; {expected}") from error
+    try:
+        network = load_script(script)
         with torch.inference_mode():
             features = [
                 network(_region_images(regions[i : i + _BATCH]))
                 for i in range(0, len(regions), _BATCH)
             ]
         result: NDArray[np.float64] = torch.cat(features).double().numpy()
-    except Exception as error:  # torch raises many types for files and inputs that do not fit
+    except Exception as error:  # torch raises many types for inputs that do not fit
         raise ModelError(
-            f"{path}: cannot compute features with it ({type(error).__name__}); it must be a "
-            "TorchScript file that maps uint8 images (B, 3, 299, 299) to (B, F)"
+            f"{path}: cannot compute features with it ({type(error).__name__}); {expected}"
         ) from error
-    if result.ndim != 2:
-        raise ModelError(f"{path}: gives features of shape {result.shape}, expected (B, F)")
+    if result.ndim != 2 or len(result) != len(regions) or not np.isfinite(result).all():
+        raise ModelError(
+            f"{path}: gives features of shape {result.shape}, or some that are not finite; "
+            f"{expected}"
+        )
     return result
 
 

@@ -47,7 +47,9 @@ def save_sample_grid(evaluation: Evaluation, tasks: Tasks, path: Path) -> None:
             axes.set_title(f"{name}: IoU {ious[i]:.2f}", fontsize=10)
             handles = _draw_case(axes, evaluation.predicted[i], tasks, i)
     figure.legend(handles=handles, loc="outside lower center", ncols=6, frameon=False)
-    figure.suptitle(f"{evaluation.name}: predicted and true regions", fontsize=12)
+    # A dollar sign in the name of a file begins no formula.
+    title = f"{evaluation.name}: predicted and true regions"
+    figure.suptitle(title, fontsize=12, parse_math=False)
     write_figure(figure, path, dots_per_inch=120)
 
 

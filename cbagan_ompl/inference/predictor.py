@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..common.validation import require_torch
-from ..errors import ModelError
+from ..common.files import as_path
+from ..common.validation import require_torch, truth_value, whole_number
+from ..errors import MapError, ModelError, show
 from ..maps.grid_map import GridMap
+from ..networks.config import MAX_IMAGE_SIZE
 from ..sampling.heatmap import Heatmap
-from .model_files import bundled_model, load_script, read_record
+from .model_files import bundled_model, load_script, read_model
+from .probe import Kind, try_model
 
 if TYPE_CHECKING:
     import torch
@@ -31,7 +33,10 @@ _MAX_ENLARGEMENT = 2
 def load_model(path: str | PathLike[str] | None = None) -> Predictor:
     """Load an exported model, ready to predict.
 
-    TorchScript files can carry code, so load only files from a source that you trust.
+    TorchScript files can carry code, so load only files from a source that you trust. Damage is
+    found before it does harm: archive, record and the length of each tensor are checked before
+    torch opens the file, and a model that no ``manifest.json`` beside it lists (``export`` writes
+    one) is tried in another process first, which takes a second, once for each content.
 
     Args:
         path: a file that ``cbagan-ompl export`` wrote; the bundled model by default.
@@ -45,11 +50,15 @@ def load_model(path: str | PathLike[str] | None = None) -> Predictor:
         Predictor('cbagan-worlds', working size 256 pixels)
     """
     require_torch()
-    source = bundled_model() if path is None else Path(path)
-    record = read_record(source)
+    source = bundled_model() if path is None else as_path(path, ModelError)
+    model = read_model(source)
+    if not model.is_listed:
+        try_model(str(source), model.script, Kind.REGION, model.record["working_size"])
     try:
-        predictor = Predictor(load_script(source), record)
+        predictor = Predictor(load_script(model.script), model.record)
         predictor.warm_up()
+    except ModelError as error:
+        raise ModelError(f"{source}: {error}; copy or export it again") from error
     except Exception as error:  # torch raises many types for damaged archives
         raise ModelError(
             f"{source}: torch cannot load the model ({type(error).__name__}), the file is "
@@ -71,6 +80,10 @@ class Predictor:
             :class:`cbagan_ompl.networks.export_model.RegionModel`.
         record: the record of its file.
 
+    Raises:
+        ModelError: the module cannot be called, or the record is none.
+        ConfigError: the ``working_size`` of the record makes no sense.
+
     Example:
         >>> from cbagan_ompl import GridMap
         >>> heatmap = load_model().predict(GridMap.load("bundled:rooms"), (20, 20), (230, 230))
@@ -79,15 +92,28 @@ class Predictor:
     """
 
     def __init__(self, module: torch.nn.Module, record: dict[str, Any]) -> None:
+        if not callable(module) or not isinstance(record, dict):
+            raise ModelError(
+                f"a Predictor takes a module and its record, got {show(module)} and "
+                f"{show(record)}; load_model makes one from a file"
+            )
+        whole_number("working_size", record.get("working_size", 0), 1, MAX_IMAGE_SIZE)
         self._module = module
         self.record = record
         self.inference_threads = 1
 
     def warm_up(self) -> None:
-        """Predict for an empty map, since the first call takes up to four times as long."""
+        """Predict for an empty map, since the first call takes up to four times as long.
+
+        Raises:
+            ModelError: the output is no image of probabilities.
+        """
         size = int(self.record["working_size"])
         endpoints = np.array([[0.5, 0.5], [size - 0.5, size - 0.5]])
-        self.probabilities(np.ones((1, size, size), np.bool_), endpoints[:1], endpoints[1:])
+        free = np.ones((1, size, size), np.bool_)
+        values = self.probabilities(free, endpoints[:1], endpoints[1:])
+        if values.shape != free.shape or not ((values >= 0) & (values <= 1)).all():
+            raise ModelError("the model gives no image of probabilities, it is probably damaged")
 
     def predict(
         self, grid: GridMap, start: ArrayLike, goal: ArrayLike, repair: bool = True
@@ -103,8 +129,16 @@ class Predictor:
                 :meth:`Heatmap.connected`; without it the heat map is the network's output.
 
         Raises:
+            MapError: ``grid`` is no :class:`GridMap`.
             TaskError: see :meth:`GridMap.check_task`.
+            ConfigError: ``repair`` is no truth value.
         """
+        if not isinstance(grid, GridMap):
+            raise MapError(
+                f"predict takes a GridMap, got {show(grid)}; make one of an array, true where "
+                "free, with GridMap(array)"
+            )
+        repair = truth_value("repair", repair)
         endpoints = grid.to_pixel(grid.check_task(start, goal))
         shape = scaled_shape(grid.shape, int(self.record["working_size"]))
         scaled = endpoints * (shape[1] / grid.width, shape[0] / grid.height)

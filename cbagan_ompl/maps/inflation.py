@@ -23,4 +23,5 @@ def erode(free: NDArray[np.bool_], radius: float) -> NDArray[np.bool_]:
     grown = cv2.dilate((~free).astype(np.uint8), np.ones((3, 3), np.uint8))
     gap = cv2.distanceTransform(1 - grown, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     # The factor covers the rounding of float32 and of the division: 1.1 / 0.1 is 11 pixels.
-    return np.asarray(gap >= radius * (1 - 1e-6))
+    # The limit keeps absurd radii within the range of float32.
+    return np.asarray(gap >= min(radius * (1 - 1e-6), 1e30))

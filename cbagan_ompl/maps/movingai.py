@@ -11,8 +11,15 @@ from typing import NamedTuple
 import numpy as np
 
 from ..common.files import read_text
-from ..errors import MapError
-from .raw_map import RawMap, check_map_size
+from ..errors import MapError, show
+from .raw_map import MAX_PIXELS, MAX_SIDE, RawMap, check_map_size
+
+# A map of the largest size, with its header, blanks and line ends.
+_LONGEST_HEADER, _ROW_SLACK = 2**14, 80
+_MAX_MAP_BYTES = MAX_PIXELS + MAX_SIDE * _ROW_SLACK + _LONGEST_HEADER
+
+#: Largest file of tasks, in bytes, and most tasks in one.
+MAX_TASK_BYTES, MAX_TASKS = 2**23, 100_000
 
 _FREE = ".GS"
 _BLOCKED = "@OTW"
@@ -29,7 +36,8 @@ def read_movingai_map(path: Path) -> RawMap:
     Raises:
         MapError: the file cannot be read or is malformed; the message names the line.
     """
-    lines = read_text(path).splitlines()
+    text = read_text(path, limit=_MAX_MAP_BYTES)
+    lines = text[:_LONGEST_HEADER].splitlines()
     header: dict[str, str] = {}
     for line in lines[:4]:
         key, _, value = line.strip().partition(" ")
@@ -39,11 +47,15 @@ def read_movingai_map(path: Path) -> RawMap:
     if set(header) != {"type", "height", "width", "map"} or header["map"]:
         raise MapError(
             f"{path}: no MovingAI map; its first lines must be 'type octile', 'height N', "
-            f"'width N' and 'map', they are {[line[:40] for line in lines[:4]]}"
+            f"'width N' and 'map', they are {show([line[:40] for line in lines[:4]])}"
         )
     height, width = (_count(path, lines, key) for key in ("height", "width"))
     check_map_size(width, height, str(path))
-
+    if len(text) > _LONGEST_HEADER + height * (width + _ROW_SLACK):
+        raise MapError(
+            f"{path}: {len(text)} characters are far more than those of {height} rows of {width}"
+        )
+    lines = text.splitlines()
     rows = [line.rstrip() for line in lines[4:]]
     while len(rows) > height and not rows[-1]:
         rows.pop()
@@ -101,12 +113,14 @@ def read_scenarios(path: Path) -> list[Scenario]:
         MapError: the file cannot be read, is no version 1 scenario file, or has a malformed line
             (named in the message) or none at all.
     """
-    lines = read_text(path).splitlines()
+    lines = read_text(path, limit=MAX_TASK_BYTES).splitlines()
     if not lines or lines[0].split() not in (["version", "1"], ["version", "1.0"]):
         raise MapError(
             f"{path}, line 1: a scenario file begins with 'version 1', "
             f"this one with {(lines or [''])[0][:40]!r}"
         )
+    if len(lines) > MAX_TASKS:
+        raise MapError(f"{path}: {len(lines)} lines, at most {MAX_TASKS} are read")
     scenarios = [
         _scenario(f"{path}, line {number}", line)
         for number, line in enumerate(lines[1:], start=2)
@@ -128,9 +142,10 @@ def _scenario(location: str, line: str) -> Scenario:
         width, height, start_x, start_y, goal_x, goal_y = (int(field) for field in fields[2:8])
         float(fields[8])
     except ValueError as error:
-        raise MapError(f"{location}: not a number: {error}") from error
+        raise MapError(f"{location}: not a number: {str(error)[:200]}") from error
     if width < 1 or height < 1:
         raise MapError(f"{location}: the map size {width} x {height} must be positive")
+    check_map_size(width, height, location)
     for role, x, y in (("start", start_x, start_y), ("goal", goal_x, goal_y)):
         if not (0 <= x < width and 0 <= y < height):
             raise MapError(f"{location}: {role} ({x}, {y}) is outside a map of {width} x {height}")

@@ -10,10 +10,10 @@ from math import isfinite
 from pathlib import Path, PureWindowsPath
 
 from ..common.files import read_text
-from ..errors import MapError
+from ..errors import MapError, show
 from .grid_map import GridMap
 from .loading import BUNDLED, bundled_folder
-from .movingai import read_scenarios
+from .movingai import MAX_TASK_BYTES, MAX_TASKS, read_scenarios
 
 _COLUMNS = ("map", "start_x", "start_y", "goal_x", "goal_y")
 
@@ -109,7 +109,7 @@ def tasks_of(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
     file = Path(path)
     if file.suffix.lower() == ".map":
         for beside in (Path(f"{file}.scen"), file.with_suffix(".scen")):
-            if beside.is_file():
+            if os.path.isfile(beside):  # False also where the name is too long to be one
                 return load_tasks(beside, grid)
     return []
 
@@ -140,7 +140,10 @@ def _scen_tasks(path: Path, grid: GridMap) -> list[Task]:
 
 def _csv_tasks(path: Path, grid: GridMap) -> list[Task]:
     tasks, others = [], set()
-    reader = csv.DictReader(read_text(path).splitlines(), skipinitialspace=True)
+    lines = read_text(path, limit=MAX_TASK_BYTES).splitlines()
+    if len(lines) > MAX_TASKS:
+        raise MapError(f"{path}: {len(lines)} lines, at most {MAX_TASKS} are read")
+    reader = csv.DictReader(lines, skipinitialspace=True)
     try:
         missing = [name for name in _COLUMNS if name not in (reader.fieldnames or ())]
         if missing:
@@ -179,5 +182,5 @@ def _number(location: str, row: dict[str, str], column: str) -> float:
     except ValueError:
         number = float("nan")
     if not isfinite(number):
-        raise MapError(f"{location}: {column} must be a finite number, got {row[column]!r}")
+        raise MapError(f"{location}: {column} must be a finite number, got {show(row[column])}")
     return number

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
+from math import isfinite
 from typing import Any, NamedTuple
 
-from ..errors import ConfigError
+from ..errors import ConfigError, show
 
 #: The networks that the CBAGAN-RRT paper (https://arxiv.org/abs/2305.10442) compares, as changes
 #: of a :class:`NetworkConfig`: CBAGAN, its ablations with spatial attention, channel attention or
@@ -29,6 +30,16 @@ NETWORKS: dict[str, dict[str, Any]] = {
     },
 }
 
+#: Height and width of the largest images that networks are trained on and applied to, in pixels.
+MAX_IMAGE_SIZE = 1024
+
+#: Most weights of the generator and the discriminators of a run together; the paper's have two
+#: million. A checkpoint has up to six numbers for each.
+MAX_WEIGHTS = 2**23
+
+# Channels of a layer, and stages of a generator, which halve an image each.
+_MAX_WIDTH, _MAX_STAGES = 4096, 10
+
 # The queries of self-attention have an eighth of the channels of its input.
 _MIN_SELF_ATTENTION_WIDTH = 8
 
@@ -46,7 +57,28 @@ class Rule(NamedTuple):
 
 
 AT_LEAST_0 = Rule(lambda value: value >= 0, "at least 0")
-AT_LEAST_1 = Rule(lambda value: value >= 1, "at least 1")
+
+
+def between(least: int, most: int) -> Rule:
+    """Return the rule of a whole number with both bounds."""
+    return Rule(lambda value: least <= value <= most, f"at least {least} and at most {most}")
+
+
+def check_types(config: Any, defaults: Mapping[str, Any]) -> None:
+    """Raise if a value of a configuration is not of the type of its option.
+
+    Args:
+        config: has an attribute for each of the defaults.
+        defaults: a value of the right type for each option.
+
+    Raises:
+        ConfigError: the message has the name of the option, the type and the value.
+    """
+    for name, default in defaults.items():
+        value = getattr(config, name)
+        if isinstance(value, str) != isinstance(default, str) or isinstance(value, list):
+            raise _wrong_type(name, default, value)
+        _convert(default, name, value)
 
 
 def check_values(config: object, rules: Mapping[str, Rule]) -> None:
@@ -62,7 +94,7 @@ def check_values(config: object, rules: Mapping[str, Rule]) -> None:
     for name, rule in rules.items():
         value = getattr(config, name)
         if not rule.holds(value):
-            raise ConfigError(f"{name} must be {rule.text}, got {value}")
+            raise ConfigError(f"{name} must be {rule.text}, got {show(value)}")
 
 
 def convert_values(defaults: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
@@ -91,14 +123,20 @@ def _convert(default: Any, name: str, value: Any) -> Any:
             return tuple(value)
     elif isinstance(default, float):
         try:
-            if not isinstance(value, bool):
-                return float(value)
-        except (TypeError, ValueError):
-            pass
+            number = float(value)
+        except Exception:  # whatever the class of the value raises
+            number = float("nan")
+        if isfinite(number) and not isinstance(value, bool):
+            return number
     elif type(value) is type(default):
         return value
-    kind = "list of integers" if isinstance(default, tuple) else type(default).__name__
-    raise ConfigError(f"{name} must be a value of type {kind}, got {value!r}")
+    raise _wrong_type(name, default, value)
+
+
+def _wrong_type(name: str, default: Any, value: Any) -> ConfigError:
+    kinds = {tuple: "list of integers", float: "finite float"}
+    kind = kinds.get(type(default), type(default).__name__)
+    return ConfigError(f"{name} must be a value of type {kind}, got {show(value)}")
 
 
 @dataclass(frozen=True)
@@ -140,12 +178,18 @@ class NetworkConfig:
     white_obstacles: bool = False
 
     def __post_init__(self) -> None:
+        check_types(self, {field.name: field.default for field in fields(self)})
         if len(self.widths) < 3 or min(self.widths) < 1:
-            raise ConfigError(f"widths are three or more positive numbers, got {self.widths}")
+            raise ConfigError(f"widths are three or more positive numbers, got {show(self.widths)}")
+        if len(self.widths) > _MAX_STAGES or max(self.widths) > _MAX_WIDTH:
+            raise ConfigError(
+                f"widths are at most {_MAX_STAGES} numbers of at most {_MAX_WIDTH}, got "
+                f"{show(self.widths)}"
+            )
         if self.self_attention and min(self.widths[1:]) < _MIN_SELF_ATTENTION_WIDTH:
             raise ConfigError(
                 "with self_attention all widths but the first must be at least "
-                f"{_MIN_SELF_ATTENTION_WIDTH}, got {self.widths}"
+                f"{_MIN_SELF_ATTENTION_WIDTH}, got {show(self.widths)}"
             )
         check_values(self, RULES)
         if self.patch == 1:
@@ -157,8 +201,8 @@ class NetworkConfig:
         Raises:
             ConfigError: there is no network of that name.
         """
-        if name not in NETWORKS:
-            raise ConfigError(f"unknown network {name!r}; choose one of {', '.join(NETWORKS)}")
+        if not isinstance(name, str) or name not in NETWORKS:
+            raise ConfigError(f"unknown network {show(name)}; choose one of {', '.join(NETWORKS)}")
         return self.updated(NETWORKS[name])
 
     def updated(self, values: Mapping[str, Any]) -> NetworkConfig:
@@ -176,11 +220,11 @@ class NetworkConfig:
 
 #: The rule of each option that is a number.
 RULES = {
-    "stem": AT_LEAST_1,
-    "patch": AT_LEAST_1,
-    "noise_stem": AT_LEAST_1,
-    "cost_maps": AT_LEAST_0,
-    "discriminator_width": AT_LEAST_1,
+    "stem": between(1, _MAX_WIDTH),
+    "patch": between(1, 64),
+    "noise_stem": between(1, _MAX_WIDTH),
+    "cost_maps": between(0, 64),
+    "discriminator_width": between(1, _MAX_WIDTH),
 }
 
 _LEFT_OUT = Rule(lambda value: not value, "left out where patch is 1")

@@ -2,11 +2,35 @@
 
 from __future__ import annotations
 
+import torch
+
+from ..errors import ConfigError
 from .attention import Attention
-from .config import NetworkConfig
+from .config import MAX_WEIGHTS, NetworkConfig
 from .discriminator import Discriminator
 from .generator import Generator
 from .patch_generator import PatchGenerator
+
+
+def check_weights(config: NetworkConfig) -> None:
+    """Raise if the networks have too many weights, before memory is spent for them.
+
+    Raises:
+        ConfigError: the generator and the two discriminators have more than
+            :data:`.config.MAX_WEIGHTS`.
+    """
+    with torch.device("meta"):
+        generator, discriminator = make_generator(config), make_discriminator(config)
+    count, count_of_discriminator = (
+        sum(weight.numel() for weight in network.parameters())
+        for network in (generator, discriminator)
+    )
+    count += 2 * count_of_discriminator
+    if count > MAX_WEIGHTS:
+        raise ConfigError(
+            f"the networks have {count:,} weights, the most is {MAX_WEIGHTS:,}; choose smaller "
+            "widths"
+        )
 
 
 def make_generator(config: NetworkConfig) -> Generator | PatchGenerator:

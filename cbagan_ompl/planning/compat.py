@@ -6,12 +6,9 @@ by what the bindings offer, not by version number, so that a build that binds mo
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, redirect_stdout
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
-from io import StringIO
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -96,26 +93,6 @@ def new_benchmark(
 def benchmark_request() -> Any:
     """Return what ``Benchmark.benchmark`` takes: limits and options, as attributes to set."""
     return ot.Benchmark.Request() if BOOST_PYTHON else ot.Request()
-
-
-def fill_statistics_database(logs: Sequence[Path], database: Path) -> bool:
-    """Run OMPL's own ``ompl_benchmark_statistics`` on logs.
-
-    Args:
-        logs: that Benchmark has saved.
-        database: SQLite file to be written.
-
-    Returns:
-        Whether this build has it: OMPL 1.7 does not.
-    """
-    if not hasattr(ot, "readBenchmarkLog"):
-        return False
-    # It prints what it reads, and leaves closing the database to the garbage collector.
-    with redirect_stdout(StringIO()), warnings.catch_warnings():
-        warnings.simplefilter("ignore", ResourceWarning)
-        ot.readBenchmarkLog(str(database), [str(log) for log in logs], False)
-        ot.computeViews(str(database), False)
-    return True
 
 
 def plane_space(low: NDArray[np.float64], high: NDArray[np.float64]) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
@@ -156,6 +157,7 @@ def run_benchmark(
     Raises:
         PlannerError: an unknown planner, or one that no hook reaches on this OMPL.
         ConfigError: a parameter that a planner does not have.
+        OSError: OMPL cannot write its log, as on a full disk.
         KeyboardInterrupt: after an interrupt, once the run that it came in is over.
     """
     with compat.log_level(ou.LOG_ERROR), TemporaryDirectory() as folder, InterruptGuard() as guard:
@@ -171,12 +173,24 @@ def run_benchmark(
         while len(logs) < options.runs and not guard.tripped:
             session.prepare_round()
             benchmark.benchmark(_one_run(options.time))
-            log = Path(folder) / "round.log"
-            benchmark.saveResultsToFile(str(log))
-            logs.append(log.read_text(encoding="utf-8", errors="replace"))
+            logs.append(_save_log(benchmark, Path(folder) / "round.log"))
             after_round()
         session.end_run()
         return Recording(logs, session.records)
+
+
+def _save_log(benchmark: Any, path: Path) -> str:
+    """Return the log of a Benchmark, by way of a file.
+
+    Raises:
+        OSError: OMPL has not written it to its end; it does not say so itself.
+    """
+    path.unlink(missing_ok=True)
+    benchmark.saveResultsToFile(str(path))
+    text = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
+    if not text.endswith("\n.\n"):
+        raise OSError(errno.ENOSPC, "OMPL cannot write its log to the end", str(path))
+    return text
 
 
 def _one_run(time: float) -> Any:

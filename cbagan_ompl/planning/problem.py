@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ConfigError
+from ..errors import ConfigError, show
 from ..maps.grid_map import GridMap
 from . import compat
 from .compat import og
@@ -85,15 +85,14 @@ def set_parameter(planner: Any, name: str, value: bool | float | str) -> None:
     wanted = name.replace("_", "")
     if wanted not in setters:
         raise ConfigError(
-            f"{kind} has no parameter {name!r} to set; its setters are "
+            f"{kind} has no parameter {show(name)} to set; its setters are "
             f"{', '.join(setters.values())}"
         )
     try:
         getattr(planner, setters[wanted])(value)
-    # Boost.Python's ArgumentError is a TypeError.
-    except TypeError as error:
+    except Exception as error:  # whatever the bindings, and OMPL itself, raise
         raise ConfigError(
-            f"{kind}.{setters[wanted]} does not take {value!r} ({type(value).__name__})"
+            f"{kind}.{setters[wanted]} does not take {show(value)} ({type(value).__name__})"
         ) from error
 
 

@@ -14,13 +14,15 @@ from torch.nn import functional
 from ..datasets.dataset import Tasks
 from ..errors import DatasetError
 from ..networks.blocks import stride_of
+from ..networks.config import MAX_IMAGE_SIZE
 from ..networks.discriminator import MIN_PATCHES
 from ..networks.encoding import map_image, point_image, region_image
+from ..networks.factory import check_weights
 from .config import TrainingConfig
 
 
 def check_trainable(size: int, config: TrainingConfig) -> None:
-    """Raise if the networks cannot take images of a size.
+    """Raise if the networks are too large, or cannot take images of a size.
 
     Args:
         size: height and width of the images in pixels.
@@ -28,9 +30,15 @@ def check_trainable(size: int, config: TrainingConfig) -> None:
 
     Raises:
         DatasetError: at some scale of the recipe the size is no multiple of the networks' strides,
-            or too small for the discriminators.
+            or too small for the discriminators; or larger than any model may take.
+        ConfigError: the networks have too many weights.
     """
     network, scales = config.network, config.scales
+    check_weights(network)
+    if size > MAX_IMAGE_SIZE:
+        raise DatasetError(
+            f"the networks take images of at most {MAX_IMAGE_SIZE} pixels; these have {size}"
+        )
     stride = stride_of(network.patch, network.widths) * lcm(*scales)
     if size % stride:
         raise DatasetError(

@@ -11,24 +11,26 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
-import yaml
-
-from ..common.files import read_text
-from ..errors import ConfigError
+from ..common.files import as_path, read_bytes
+from ..common.yaml_text import MAX_YAML_BYTES, parse_yaml
+from ..errors import ConfigError, show
 from ..networks.config import (
     AT_LEAST_0,
-    AT_LEAST_1,
     NetworkConfig,
     Rule,
+    between,
+    check_types,
     check_values,
     convert_values,
 )
 
 SCHEDULES = ("one-cycle", "exponential")
 PRECISIONS = ("float32", "bfloat16")
+
+#: Most epochs of a run.
+MAX_EPOCHS = 10_000
 
 
 @dataclass(frozen=True)
@@ -121,10 +123,15 @@ class TrainingConfig:
     seed: int = 0
 
     def __post_init__(self) -> None:
+        check_types(
+            self, {field.name: field.default for field in fields(self) if field.name != "network"}
+        )
+        if not isinstance(self.network, NetworkConfig):
+            raise ConfigError(f"network is a NetworkConfig, got {show(self.network)}")
         for name, choices in (("schedule", SCHEDULES), ("precision", PRECISIONS)):
             if getattr(self, name) not in choices:
                 raise ConfigError(
-                    f"{name} is one of {', '.join(choices)}, got {getattr(self, name)!r}"
+                    f"{name} is one of {', '.join(choices)}, got {show(getattr(self, name))}"
                 )
         check_values(self, RULES)
 
@@ -135,8 +142,8 @@ class TrainingConfig:
         Raises:
             ConfigError: there is no preset of that name.
         """
-        if name not in PRESETS:
-            raise ConfigError(f"unknown preset {name!r}; choose one of {', '.join(PRESETS)}")
+        if not isinstance(name, str) or name not in PRESETS:
+            raise ConfigError(f"unknown preset {show(name)}; choose one of {', '.join(PRESETS)}")
         return PRESETS[name]
 
     @classmethod
@@ -149,7 +156,8 @@ class TrainingConfig:
             ConfigError: the file is missing, cannot be parsed, holds an unknown option, or a value
                 of the wrong type or out of range.
         """
-        values = _parse_yaml(read_text(Path(path), ConfigError), str(path))
+        text = read_bytes(as_path(path), ConfigError, MAX_YAML_BYTES)
+        values = parse_yaml(text, str(path), ConfigError)
         if not isinstance(values, dict):
             raise ConfigError(f"{path}: a configuration holds lines such as 'epochs: 20'")
         return (base or cls()).updated(values)
@@ -177,8 +185,8 @@ class TrainingConfig:
         for assignment in assignments:
             name, equals, text = assignment.partition("=")
             if not equals:
-                raise ConfigError(f"--set takes KEY=VALUE, got {assignment!r}")
-            values[name] = _parse_yaml(text, f"--set {assignment}")
+                raise ConfigError(f"--set takes KEY=VALUE, got {show(assignment)}")
+            values[name] = parse_yaml(text, f"--set {show(assignment)}", ConfigError)
         return self.updated(values)
 
     def updated(self, values: Mapping[Any, Any]) -> TrainingConfig:
@@ -193,7 +201,7 @@ class TrainingConfig:
         known = self.to_dict()
         for name in values:
             if name not in known:
-                raise ConfigError(f"unknown option {name!r}; known are {', '.join(known)}")
+                raise ConfigError(f"unknown option {show(name)}; known are {', '.join(known)}")
         own = {option.name: getattr(self, option.name) for option in fields(self)}
         network = {name: value for name, value in values.items() if name not in own}
         rest = {name: value for name, value in values.items() if name in own}
@@ -209,22 +217,16 @@ class TrainingConfig:
         }
 
 
-def _parse_yaml(text: str, source: str) -> Any:
-    try:
-        return yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise ConfigError(f"{source}: neither JSON nor YAML ({error})") from error
-
-
 _POSITIVE = Rule(lambda value: value > 0, "positive")
 _FACTOR = Rule(lambda value: 0 < value <= 1, "above 0 and at most 1")
 _BELOW_1 = Rule(lambda value: 0 <= value < 1, "at least 0 and below 1")
 
 #: The rule of each option that is a number, and of ``scales``.
 RULES = {
-    "epochs": AT_LEAST_1,
+    # More would make the log in a checkpoint longer than a reader follows.
+    "epochs": between(1, MAX_EPOCHS),
     # Batch norm needs two tasks where the coarsest stage has one pixel.
-    "batch_size": Rule(lambda value: value >= 2, "at least 2"),
+    "batch_size": between(2, 2**16),
     "generator_lr": _POSITIVE,
     "map_discriminator_lr": _POSITIVE,
     "point_discriminator_lr": _POSITIVE,
@@ -234,9 +236,9 @@ RULES = {
     "clip_norm": AT_LEAST_0,
     "warmup": _BELOW_1,
     "decay": _FACTOR,
-    "plateau_patience": AT_LEAST_0,
+    "plateau_patience": between(0, MAX_EPOCHS),
     "plateau_factor": _FACTOR,
-    "adversarial_every": AT_LEAST_1,
+    "adversarial_every": between(1, 2**31),
     "adversarial_weight": AT_LEAST_0,
     "adaptive_alpha": AT_LEAST_0,
     "pixel_weight": AT_LEAST_0,
@@ -244,7 +246,10 @@ RULES = {
     "dice_weight": AT_LEAST_0,
     "dice_smooth": AT_LEAST_0,
     "positive_weight": AT_LEAST_0,
-    "scales": Rule(lambda value: len(value) > 0 and min(value) >= 1, "at least 1"),
+    "scales": Rule(
+        lambda value: 0 < len(value) <= 64 and min(value) >= 1 and max(value) <= 64,
+        "from 1 to 64, and 64 of them at most",
+    ),
     "ema_decay": _BELOW_1,
     "validation_fraction": Rule(lambda value: 0 < value < 1, "between 0 and 1"),
     # The bounds of torch's random numbers.

@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 import torch
 from torch import Tensor, distributed, nn
 
-from ..errors import ConfigError
+from ..errors import ConfigError, show
 
 T = TypeVar("T")
 
@@ -78,8 +78,10 @@ def pick_device(name: str) -> torch.device:
         torch.empty(1, device=device)
         if device.type == "cuda":
             torch.cuda.set_device(device)
-    except (RuntimeError, AssertionError) as error:
-        raise ConfigError(f"cannot use device {name!r}: {error}") from error
+        elif device.type == "meta":
+            raise ValueError("it computes nothing")
+    except Exception as error:  # torch raises many types
+        raise ConfigError(f"cannot use device {show(name)}: {error}") from error
     return device
 
 

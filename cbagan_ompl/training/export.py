@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import hashlib
 import io
 import json
 import warnings
@@ -13,9 +14,19 @@ from typing import Any
 import torch
 from torch import nn
 
-from ..common.files import make_folder, write_atomically
-from ..errors import ModelError
-from ..inference.model_files import MANIFEST, RECORD_NAME, RECORD_SCHEMA, read_manifest, sha256
+from ..common.files import as_path, make_folder, read_bytes, read_text, write_atomically
+from ..common.outputs import check_output
+from ..errors import ModelError, show
+from ..inference.archives import Archive
+from ..inference.model_files import (
+    MANIFEST,
+    MAX_MODEL_BYTES,
+    MAX_NAME_LENGTH,
+    RECORD_MEMBER,
+    RECORD_NAME,
+    RECORD_SCHEMA,
+    read_manifest,
+)
 from ..networks.export_model import RegionModel
 from .checkpoints import best_generator, load_checkpoint
 
@@ -27,8 +38,19 @@ INPUTS = (
 OUTPUTS = "float (B, 1, H, W) in [0, 1]: probability that a pixel belongs to the promising region"
 
 
+# In every card, by which it is known as one.
+_CARD_LINE = (
+    "Predicts, for a 2-D occupancy map with a start and a goal, the region that good paths probably"
+)
+_MAX_CARD_BYTES = 2**20
+
+
 def export(
-    checkpoint: str | PathLike[str], path: str | PathLike[str], *, note: str = ""
+    checkpoint: str | PathLike[str],
+    path: str | PathLike[str],
+    *,
+    note: str = "",
+    force: bool = False,
 ) -> dict[str, Any]:
     """Write the generator of a checkpoint as a TorchScript file with its record.
 
@@ -40,28 +62,72 @@ def export(
         path: the file to write; its suffix is ``.pt``.
         note: what the checkpoint cannot tell, for the record and the card: the origin of the data,
             and the licences of data and model.
+        force: write over files of these names that no export wrote.
 
     Returns:
         The record, as the file carries it.
 
     Raises:
-        ModelError: the checkpoint cannot be read, the file cannot be written, or has another
-            suffix.
+        ModelError: the checkpoint cannot be read, the file cannot be written, has another suffix,
+            or a name that is too long or not printable; or a file would be lost.
     """
-    target = Path(path)
+    target = as_path(path, ModelError)
     if target.suffix != ".pt":
         raise ModelError(f"{target}: the name of an exported model ends in .pt")
+    if not target.stem.isprintable() or len(target.stem) > MAX_NAME_LENGTH:
+        raise ModelError(
+            f"a model cannot be called {show(target.stem)}: its name is printable and has at most "
+            f"{MAX_NAME_LENGTH} characters"
+        )
     state = load_checkpoint(checkpoint)
-    generator = best_generator(state)
+    generator = best_generator(state, checkpoint)
     record = make_record(target.stem, state, generator, note)
     make_folder(target.parent, ModelError)
+    _check_outputs(target, as_path(checkpoint), force)
     model = RegionModel(generator).eval()
     # Convolutions in this layout take four fifths of the time on a CPU.
     model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     save_script(model, target, record)
     write_atomically(target.with_suffix(".md"), model_card(record), ModelError)
-    _update_manifest(target)
+    _update_manifest(target, force)
     return record
+
+
+def _check_outputs(model: Path, checkpoint: Path, force: bool) -> None:
+    """Raise if a file would be overwritten that is an input, or that no export wrote."""
+    for path, is_ours in (
+        (model, _is_model),
+        (model.with_suffix(".md"), _is_card),
+        (model.parent / MANIFEST, _is_manifest),
+    ):
+        check_output(str(path), [checkpoint], force=True)
+        if path.exists() and not force and not is_ours(path):
+            raise ModelError(
+                f"{path} exists, and `cbagan-ompl export` did not write it; choose another "
+                "--output, or overwrite it with --force"
+            )
+
+
+def _is_model(path: Path) -> bool:
+    try:
+        # A damaged model may be replaced; what has no record is no model.
+        return RECORD_MEMBER in Archive(read_bytes(path, ModelError, MAX_MODEL_BYTES)).sizes
+    except Exception:  # zipfile lets many types through
+        return False
+
+
+def _is_card(path: Path) -> bool:
+    try:
+        return _CARD_LINE in " ".join(read_text(path, ModelError, _MAX_CARD_BYTES).split())
+    except ModelError:
+        return False
+
+
+def _is_manifest(path: Path) -> bool:
+    try:
+        return bool(read_manifest(path))
+    except ModelError:
+        return False
 
 
 def save_script(model: nn.Module, path: Path, record: dict[str, Any]) -> None:
@@ -201,10 +267,11 @@ def _describe_network(recipe: dict[str, Any]) -> str:
     return f"a GAN with {' and '.join(kinds) or 'no'} attention"
 
 
-def _update_manifest(model: Path) -> None:
+def _update_manifest(model: Path, force: bool) -> None:
     path = model.parent / MANIFEST
     manifest: dict[str, Any] = {"default": model.name, "files": {}}
-    if path.exists():
+    if path.exists() and not (force and not _is_manifest(path)):
         manifest = read_manifest(path)
-    manifest["files"][model.name] = {"sha256": sha256(model)}
+    digest = hashlib.sha256(read_bytes(model, ModelError)).hexdigest()
+    manifest["files"][model.name] = {"sha256": digest}
     write_atomically(path, json.dumps(manifest, indent=2) + "\n", ModelError)

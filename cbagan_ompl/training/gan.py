@@ -115,11 +115,17 @@ class Gan:
         return state
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Restore what :meth:`state_dict` returned."""
+        """Restore what :meth:`state_dict` returned.
+
+        Raises:
+            Exception: of many types, for a state of other networks or a damaged one.
+        """
         for name in self._networks:
             getattr(self, name).load_state_dict(state[name])
         for name, optimizer in self.optimizers.items():
+            before = [dict(group) for group in optimizer.param_groups]
             optimizer.load_state_dict(state["optimizers"][name])
+            _check_optimizer(optimizer, before)
 
     def start_from(self, state: dict[str, Any]) -> None:
         """Take over the weights of another run; the generator those of the average there.
@@ -134,12 +140,30 @@ class Gan:
             for name in self._networks:
                 weights = state["average" if name == "generator" else name]
                 getattr(self, name).load_state_dict(weights)
-        except RuntimeError as error:
+        except Exception as error:  # torch raises several types
             raise ConfigError(
                 "the run to start from has other networks: set the same options of the networks"
             ) from error
 
     _networks = ("generator", "map_discriminator", "point_discriminator", "average")
+
+
+def _check_optimizer(optimizer: torch.optim.Optimizer, groups: list[dict[str, Any]]) -> None:
+    """Raise if a state that was loaded has other options than before, or does not fit the weights.
+
+    torch compares neither, and a step would fail or read what is not there.
+    """
+    for before, now in zip(groups, optimizer.param_groups, strict=True):
+        # The learning rate is set for each step.
+        for option in before.keys() - {"lr", "params"}:
+            if type(now.get(option)) is not type(before[option]) or now[option] != before[option]:
+                raise ValueError(f"the optimiser has another {option}")
+        for weight in now["params"]:
+            state = optimizer.state.get(weight, {})
+            shapes = {name: tuple(value.shape) for name, value in state.items()}
+            shape = tuple(weight.shape)
+            if shapes and shapes != {"step": (), "exp_avg": shape, "exp_avg_sq": shape}:
+                raise ValueError("the state of the optimiser has other shapes than its weights")
 
 
 def _move(network: nn.Module, device: torch.device) -> None:

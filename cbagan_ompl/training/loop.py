@@ -15,9 +15,10 @@ import torch
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from ..common.files import make_folder, write_atomically
+from ..common.files import as_path, make_folder, write_atomically
 from ..datasets.dataset import Tasks
-from ..errors import ConfigError
+from ..errors import ConfigError, show
+from ..inference.model_files import translate_damage
 from .batches import Batch, check_trainable, encode, make_batch, scale_down
 from .checkpoints import BEST, LAST, SCHEMA, best_generator, load_checkpoint, save_checkpoint
 from .config import TrainingConfig
@@ -88,7 +89,8 @@ def train(
         source: of the tasks, see :mod:`cbagan_ompl.training.task_sources`.
         config: the recipe.
         output: the folder for the files, made if missing.
-        resume: go on from ``last.pt`` in that folder; without it the folder must hold none.
+        resume: go on from ``last.pt`` in that folder, or begin where a run ended before its first
+            epoch; without it the folder must hold no run.
         start_from: checkpoint of another run of the same networks, whose weights this one begins
             with.
         device: ``auto`` (a GPU if there is one), ``cpu``, ``cuda``, ...
@@ -107,31 +109,37 @@ def train(
         MissingDependencyError: ``tensorboard`` without the package of that name.
         ModelError: a checkpoint that cannot be read or written.
     """
-    folder, target = Path(output), pick_device(device)
+    folder, target = as_path(output), pick_device(device)
     check_trainable(source.size, config)
     with process_group(target) as group:
         if config.batch_size % group.size:
             raise ConfigError(
                 f"batches of {config.batch_size} cannot be shared evenly by {group.size} processes"
             )
-        if group.is_leader:
-            _prepare_folder(folder, resume)
+        resume = group.from_leader(_prepare_folder(folder, resume) if group.is_leader else None)
         run = _start_run(config, target, group, start_from)
         if resume:
             state = _load_matching(folder / LAST, config, source) if group.is_leader else None
-            run.load_state_dict(group.from_leader(state))
+            state = group.from_leader(state)
+            with translate_damage(folder / LAST, "damaged, its weights do not fit its networks"):
+                run.load_state_dict(state)
         _run_epochs(run, config, source, folder, target, progress, tensorboard)
         return group.from_leader(
             _finish(folder, source, target, config) if group.is_leader else None
         )
 
 
-def _prepare_folder(folder: Path, resume: bool) -> None:
-    if not resume and (folder / LAST).exists():
-        raise ConfigError(
-            f"{folder} holds a run already; resume it (--resume), or choose another folder"
-        )
+def _prepare_folder(folder: Path, resume: bool) -> bool:
+    """Make the folder of a run; return whether it holds one to go on from."""
+    if not resume:
+        for name in (LAST, BEST, LOG):
+            if (folder / name).exists():
+                raise ConfigError(
+                    f"{folder} holds a run already, or another {name}; resume the run (--resume), "
+                    "or choose another folder"
+                )
     make_folder(folder)
+    return resume and (folder / LAST).exists()
 
 
 def _start_run(
@@ -299,7 +307,7 @@ def _load_matching(path: Path, config: TrainingConfig, source: TaskSource) -> di
             "resume with the recipe that the run began with"
         )
     if state["dataset"] != source.description():
-        raise ConfigError(f"{path} belongs to another data set: {state['dataset']}")
+        raise ConfigError(f"{path} belongs to another data set: {show(state['dataset'])}")
     return state
 
 
@@ -308,7 +316,7 @@ def _finish(
 ) -> dict[str, Any]:
     """Score the best epoch on the test tasks and add the scores to its checkpoint."""
     best = load_checkpoint(folder / BEST)
-    generator = best_generator(best).to(device)
+    generator = best_generator(best, folder / BEST).to(device)
     best["test"] = evaluate(generator, source.test, device, config.batch_size)
     best["trivial"] = trivial_scores(source.test)
     save_checkpoint(best, folder / BEST)

@@ -13,6 +13,8 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from ..errors import ConfigError
+
 
 def bce_loss(predicted: Tensor, target: Tensor, positive_weight: float = 1.0) -> Tensor:
     """Return the paper's total cross-entropy loss, the mean over all pixels.
@@ -24,8 +26,16 @@ def bce_loss(predicted: Tensor, target: Tensor, positive_weight: float = 1.0) ->
         predicted: Q, probability of the region, (B, 1, H, W) in [0, 1].
         target: P, the true region, the same shape, in [0, 1].
         positive_weight: w.
+
+    Raises:
+        ConfigError: the prediction is not finite.
     """
-    loss = functional.binary_cross_entropy(predicted, target)
+    try:
+        loss = functional.binary_cross_entropy(predicted, target)
+    except RuntimeError as error:
+        if torch.isfinite(predicted).all():
+            raise
+        raise ConfigError("the prediction is not finite; lower the learning rates") from error
     if positive_weight != 1:
         # -P log Q, with PyTorch's bounds of the logarithm and of its gradient.
         missed = functional.binary_cross_entropy(predicted, torch.ones_like(target), target)

@@ -7,11 +7,12 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
+from multiprocessing import active_children
 from typing import Any, Protocol
 
-from ..common.parallel import fork_server
+from ..common.parallel import fork_server, prepare_worker, run_call
 from ..common.signals import interrupts_held
-from ..common.validation import check_at_least, require
+from ..common.validation import require, whole_number
 from ..datasets.dataset import Dataset, Tasks
 from ..datasets.synthetic import (
     TASKS_PER_MAP,
@@ -23,6 +24,9 @@ from ..errors import DatasetError
 
 # Numbers of the parts of a synthetic source; maps of different parts are different maps.
 _TRAINING, _VALIDATION, _TEST = range(3)
+
+# A map of 256 pixels and its tasks take a megabyte.
+_MAX_MAPS, _MAX_JOBS = 2**16, 2**10
 
 
 class TaskSource(Protocol):
@@ -79,7 +83,7 @@ class SyntheticSchedule:
         jobs: processes that generate maps during the training.
 
     Raises:
-        ConfigError: a number below 1.
+        ConfigError: a number that is none, below 1 or too large.
     """
 
     maps: int = 512
@@ -87,8 +91,8 @@ class SyntheticSchedule:
     jobs: int = 1
 
     def __post_init__(self) -> None:
-        for name in ("maps", "held_out", "jobs"):
-            check_at_least(name, getattr(self, name), 1)
+        for name, most in (("maps", _MAX_MAPS), ("held_out", _MAX_MAPS), ("jobs", _MAX_JOBS)):
+            whole_number(name, getattr(self, name), 1, most)
 
 
 class SyntheticSource:
@@ -126,7 +130,10 @@ class SyntheticSource:
     def _submit(self, part: int, epoch: int, count: int) -> list[Future[Tasks]]:
         numbers = range(epoch * count, (epoch + 1) * count)
         with interrupts_held():  # submitting starts the processes
-            return [self._pool.submit(generate_map_tasks, self._settings, part, n) for n in numbers]
+            return [
+                self._pool.submit(run_call, generate_map_tasks, self._settings, part, n)
+                for n in numbers
+            ]
 
     def description(self) -> dict[str, Any]:
         """Return the settings and the numbers of maps and tasks."""
@@ -173,8 +180,12 @@ def synthetic_source(
     require("numba", "train")
     with interrupts_held():
         context = fork_server()
-    pool = ProcessPoolExecutor(schedule.jobs, context)
+    others = set(active_children())
+    pool = ProcessPoolExecutor(schedule.jobs, context, prepare_worker)
     try:
         yield SyntheticSource(settings, schedule, pool)
     finally:
+        # The maps of an epoch that will not come are not waited for.
+        for child in set(active_children()) - others:
+            child.terminate()
         pool.shutdown(cancel_futures=True)

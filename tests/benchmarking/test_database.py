@@ -1,14 +1,19 @@
 from __future__ import annotations
 
 import sqlite3
-from contextlib import closing
+import warnings
+from contextlib import closing, redirect_stdout
+from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import pytest
 from helpers.benchmarks import Finished
 
-from cbagan_ompl.benchmarking.database import write_tables
+from cbagan_ompl import ConfigError
+from cbagan_ompl.benchmarking.database import write_database, write_tables
+from cbagan_ompl.benchmarking.logs import ExperimentLog
 from cbagan_ompl.planning.compat import BOOST_PYTHON
 
 COLUMNS = {
@@ -57,11 +62,55 @@ def test_database_has_what_planner_arena_reads(finished: Finished) -> None:
 
 @pytest.mark.skipif(BOOST_PYTHON, reason="the wheel has no ompl_benchmark_statistics")
 def test_own_tables_are_those_of_ompls_script(finished: Finished, tmp_path: Path) -> None:
-    theirs, ours = finished.folder / "benchmark.db", tmp_path / "ours.db"
-    write_tables(finished.logs, ours)
+    from ompl import tools
+
+    ours, theirs = finished.folder / "benchmark.db", tmp_path / "theirs.db"
+    logs = [str(log) for log in sorted((finished.folder / "logs").glob("*.log"))]
+    # It prints what it reads, and leaves closing the database to the garbage collector.
+    with redirect_stdout(StringIO()), warnings.catch_warnings():
+        warnings.simplefilter("ignore", ResourceWarning)
+        tools.readBenchmarkLog(str(theirs), logs, False)
+        tools.computeViews(str(theirs), False)
     views = ("bestPlannerConfigs", "bestPlannerConfigsPerExperiment")
     for table in (*COLUMNS, *views):
         assert columns(ours, table) == columns(theirs, table)
         names = ", ".join(sorted(name for name, _ in columns(ours, table)))
         query = f"SELECT {names} FROM {table}"
         assert rows(ours, query) == rows(theirs, query)
+
+
+def with_property(log: ExperimentLog, name: str) -> ExperimentLog:
+    planner = log.planners[0]
+    runs = tuple({**run, name: "1"} for run in planner.runs)
+    return replace(log, planners=(replace(planner, runs=runs), *log.planners[1:]))
+
+
+def test_names_are_quoted(finished: Finished, tmp_path: Path) -> None:
+    log = with_property(finished.logs[0], 'a"b);DROP--TABLE"runs; REAL')
+    write_tables([log], tmp_path / "x.db")
+    assert rows(tmp_path / "x.db", "SELECT COUNT(*) FROM runs") == [(4 * 3,)]
+    assert ('a"b);DROP--TABLE"runs;', "REAL") in columns(tmp_path / "x.db", "runs")
+    with pytest.raises(ConfigError, match="no property with its type"):
+        write_database([with_property(log, "x REAL); DROP TABLE runs; --")], tmp_path / "y.db")
+    assert [path.name for path in tmp_path.iterdir()] == ["x.db"]
+
+
+def test_columns_that_differ_in_case_are_one(finished: Finished, tmp_path: Path) -> None:
+    first, second = (
+        with_property(log, name)
+        for log, name in zip(finished.logs, ("new REAL", "NEW REAL"), strict=True)
+    )
+    write_database([first, second], tmp_path / "x.db")
+    assert rows(tmp_path / "x.db", "SELECT COUNT(new) FROM runs") == [(2 * 3,)]
+
+
+def test_a_database_that_cannot_be_written_is_left_as_it_was(
+    finished: Finished, tmp_path: Path
+) -> None:
+    path = tmp_path / "benchmark.db"
+    path.write_text("before")
+    broken = replace(finished.logs[1], name=[1])  # type: ignore[arg-type]
+    with pytest.raises(ConfigError, match=r"cannot write .*benchmark\.db"):
+        write_database([finished.logs[0], broken], path)
+    assert path.read_text() == "before"
+    assert [file.name for file in tmp_path.iterdir()] == ["benchmark.db"]

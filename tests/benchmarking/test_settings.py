@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,10 +23,9 @@ def test_parameters_of_another_form(text: str) -> None:
         parse_parameters([text])
 
 
-def test_saved_settings_have_flat_keys(tmp_path: Path) -> None:
+def test_saved_settings_have_flat_keys() -> None:
     options = SamplerOptions(0.2, 2.0, Adaptation.of(["coverage"]), 7)
-    Settings(sampler_options=options, time=1.0).save(tmp_path / "settings.json")
-    assert json.loads((tmp_path / "settings.json").read_text()) == {
+    assert Settings(sampler_options=options, time=1.0).to_dict() == {
         "planners": ["RRT", "RRTstar", "InformedRRTstar"],
         "samplers": ["uniform", "learned", "corridor"],
         "runs": 5,
@@ -52,9 +49,39 @@ def test_the_seed_of_a_benchmark_is_an_int(seed: Any) -> None:
         Settings(sampler_options=SamplerOptions(seed=seed))
 
 
-def test_settings_are_compared_with_saved_ones(tmp_path: Path) -> None:
-    settings = Settings(parameters={"RRT": {"range": 3}}, heatmap_dirs={"peer": "folder"})
-    settings.save(tmp_path / "settings.json")
-    assert settings.is_saved_in(tmp_path / "settings.json")
-    other = Settings(sampler_options=SamplerOptions(seed=1))
-    assert not other.is_saved_in(tmp_path / "settings.json")
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"runs": 10**18}, "5000 that a task may have"),
+        ({"runs": 2.5}, "runs is a whole number"),
+        ({"runs": "3"}, "runs is a whole number"),
+        ({"time": 1e300}, "at most 86400 s"),
+        ({"time": float("nan")}, "above 0"),
+        ({"time": float("inf")}, "above 0"),
+        ({"time": 10**400}, "above 0"),
+        ({"within": 10**9}, "at most 10000"),
+        ({"range": float("inf")}, "range must be above 0"),
+        ({"samplers": ("uniform", "a\nb")}, "name of a sampler"),
+        ({"samplers": ("uniform", "_a")}, "name of a sampler"),
+        ({"samplers": ("uniform", "")}, "name of a sampler"),
+        ({"samplers": ("uniform", "a" * 41)}, "name of a sampler"),
+        ({"samplers": ("uniform", "a\udcff")}, "name of a sampler"),
+        ({"planners": ("RRT",) * 2}, "each once"),
+    ],
+)
+def test_absurd_settings(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(ConfigError, match=message):
+        Settings(**changes)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [".nan", ".inf", "1e400", "[1]", "{a: 1}", "2020-01-01", "&a [*a]", "!!int ''", "9" * 5000],
+)
+def test_values_of_parameters_are_numbers_truth_values_or_words(value: str) -> None:
+    if value == "1e400":  # a word in YAML 1.1
+        assert parse_parameters([f"RRT.range={value}"]) == {"RRT": {"range": "1e400"}}
+        return
+    with pytest.raises(ConfigError, match=r"--set 'RRT\.range'") as caught:
+        parse_parameters([f"RRT.range={value}"])
+    assert len(str(caught.value)) < 1000

@@ -111,7 +111,7 @@ def test_arguments_can_be_kept_in_a_file(
     suite = tmp_path / "suite.txt"
     suite.write_text("bundled:maze\n--runs=0\n")
     assert main(["benchmark", f"@{suite}", "--output", str(tmp_path / "out")]) == 2
-    assert "runs must be at least 1" in capsys.readouterr().err
+    assert "runs is a whole number of at least 1" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -121,11 +121,11 @@ def test_arguments_can_be_kept_in_a_file(
         (["--planners", UNREACHED], f"no hook reaches {UNREACHED}"),
         (["--samplers", "uniform,magic"], "no sampler 'magic'"),
         (["--samplers", "uniform,uniform"], "each once"),
-        (["--runs", "0"], "runs must be at least 1"),
+        (["--runs", "0"], "runs is a whole number of at least 1"),
         (["--time", "-1"], "time must be above 0"),
         (["--range", "0"], "range must be above 0"),
-        (["--seed", "-1"], "seed must be"),
-        (["--jobs", "0"], "jobs must be"),
+        (["--seed", "-1"], "seed is a whole number of at least 0"),
+        (["--jobs", "0"], "jobs is a whole number of at least 1"),
         (["--uniform-fraction", "0"], "uniform_fraction"),
         (["--tasks-per-map", "0"], "at least 1"),
         (["--radius", "-1"], "radius"),

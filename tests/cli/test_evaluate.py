@@ -5,6 +5,7 @@ from pathlib import Path
 
 import cv2
 import pytest
+from helpers.damaged_archives import damaged_members
 from helpers.predictions import store
 from helpers.tiny_model import export_tiny_model
 from helpers.training_set import write_training_set
@@ -46,7 +47,7 @@ def test_evaluate_command(
     assert "not FID" in table
     result = json.loads((tmp_path / "out" / "evaluation.json").read_text())
     report = json.loads((tmp_path / "s.json").read_text())
-    assert report.pop("made_by").startswith("cbagan-ompl ")
+    assert report["made_by"].startswith("cbagan-ompl ")
     assert result == report
     predictions = result["predictions"]
     assert list(predictions) == ["tiny", "own", "all free space", "straight line"]
@@ -101,3 +102,62 @@ def test_bad_options(model: Path, folder: Path, capsys: pytest.CaptureFixture[st
     assert "cannot make the folder" in output.err
     assert not output.out
     assert run(*words, "--seed", "-1") == 2
+
+
+def test_names_with_signs_that_mean_something_elsewhere(
+    model: Path, folder: Path, dataset: Dataset, tmp_path: Path
+) -> None:
+    stored = store(tmp_path / "stored", folder, dataset.test.region, listed=True)
+    words = ["--dataset", str(folder), "--model", str(model), "--output", str(tmp_path / "out")]
+    assert run(*words, "--predictions", f"$x^{{_=\\{stored}") == 2
+    assert run(*words, "--predictions", f"$x^{{_={stored}") == 0
+    assert (tmp_path / "out" / "$x^{_.png").exists()
+
+
+@pytest.mark.parametrize("name", ["a\nb", "a\0b", "x" * 300, "a\udce9", "a\\b", "\x1b[31m"])
+def test_names_that_cannot_be_files_or_rows(
+    model: Path, folder: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["--dataset", str(folder), "--model", str(model)]
+    assert run(*words, "--predictions", f"{name}={folder}/tasks") == 2
+    said = capsys.readouterr().err
+    assert len(said) < 1000
+    assert said.isascii()
+
+
+def test_files_of_others_are_kept(
+    model: Path,
+    folder: Path,
+    dataset: Dataset,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    stored = store(tmp_path / "stored", folder, dataset.test.region, listed=True)
+    words = ["--dataset", str(folder), "--model", str(model), "--predictions", f"own={stored}"]
+    out = tmp_path / "out"
+    out.mkdir()
+    for name in ("evaluation.md", "evaluation.json", "tiny.png"):
+        (out / name).write_text("of somebody else")
+        assert run(*words, "--output", str(out)) == 2
+        assert "--force" in capsys.readouterr().err
+        assert (out / name).read_text() == "of somebody else"
+        (out / name).unlink()
+    for source in (folder, stored):
+        assert run(*words, "--output", str(source), "--force") == 2
+        assert "it is what the command reads" in capsys.readouterr().err
+    (out / "evaluation.md").write_text("of somebody else")
+    assert run(*words, "--output", str(out), "--force") == 0
+    assert run(*words, "--output", str(out)) == 0, "its own files it replaces"
+
+
+@pytest.mark.slow
+def test_damaged_inception_networks(
+    model: Path, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    valid = model.read_bytes()
+    path = tmp_path / "network.pt"
+    words = ["--dataset", str(folder), "--model", str(model), "--inception", str(path)]
+    for data in (valid, valid[:-100], *damaged_members(valid, 4, seed=1)):
+        path.write_bytes(data)
+        assert run(*words) == 2
+        assert "uint8 images (B, 3, 299, 299)" in capsys.readouterr().err

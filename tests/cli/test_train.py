@@ -28,6 +28,7 @@ def run(*words: str) -> int:
     commands = parser.add_subparsers()
     add_train_parser(commands)
     add_export_parser(commands)
+    parser.set_defaults(force=False)
     args = parser.parse_args(words)
     return int(args.run(args))
 
@@ -97,7 +98,7 @@ def test_train_and_export_on_synthetic_maps(
             DatasetError,
             "discriminators take images of at least 128 pixels; these have 64",
         ),
-        (["--synthetic", "--maps", "0"], ConfigError, "maps must be at least 1"),
+        (["--synthetic", "--maps", "0"], ConfigError, "maps is a whole number of at least 1"),
         (["--synthetic", "--hard-fraction", "2"], ConfigError, "hard_fraction"),
     ],
 )

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import pytest
+from helpers.fuzzing import mutations, read_all
 from helpers.images import png_header
 
 from cbagan_ompl.errors import MapError
@@ -70,3 +73,37 @@ def test_moving_ai_no_text(tmp_path):
     path.write_bytes(png_header(5, 5))
     with pytest.raises(MapError, match=r"binary.map is no text file"):
         GridMap.load(path)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        moving_ai().encode() + b"\n" * 2**25,
+        moving_ai().encode() + b"....." * 2**22,
+        b"type octile\n" * 2**21,
+        b"\r" * 2**25,
+        b"type octile\nheight 9\nwidth 9\nmap\n" * 2**20,
+    ],
+)
+def test_large_files_of_small_maps_are_refused_early(tmp_path, data):
+    path = tmp_path / "large.map"
+    path.write_bytes(data)
+    tracemalloc.start()
+    try:
+        with pytest.raises(MapError):
+            GridMap.load(path)
+        assert tracemalloc.get_traced_memory()[1] < 2e8
+    finally:
+        tracemalloc.stop()
+
+
+def test_damaged_maps_are_read_or_refused(tmp_path):
+    path = tmp_path / "damaged.map"
+
+    def read(data):
+        path.write_bytes(data)
+        GridMap.load(path)
+
+    valid = [moving_ai().encode(), moving_ai(["." * 30] * 20, 20, 30, "type tile").encode()]
+    counts = read_all(read, mutations(valid, 1500, 1))
+    assert min(counts["read"], counts["refused"]) > 20

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
+from helpers.fuzzing import mutations, read_all
 
 from cbagan_ompl.errors import MapError
 from cbagan_ompl.maps.grid_map import GridMap
@@ -131,6 +134,55 @@ def test_other_files(tmp_path):
         load_tasks(tmp_path / "binary.csv", GRID)
 
 
+@pytest.mark.parametrize("name", ["t.csv", "t.scen"])
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b"1,2\n" * 3_000_000, "more than the 8 MiB"),
+        (b"version 1" + b"\n" * 2**22, "4194304 lines, at most 100000"),
+        (b"version 1" + b"\r" * 2**22, "4194304 lines, at most 100000"),
+        (b"version 1\n" + b"1\t" * 2**21, "line 2: expected 9 fields|line 1: missing columns"),
+    ],
+)
+def test_large_files_are_refused_early(tmp_path, name, data, message):
+    (tmp_path / name).write_bytes(data)
+    tracemalloc.start()
+    try:
+        with pytest.raises(MapError, match=message) as caught:
+            load_tasks(tmp_path / name, GRID)
+        assert tracemalloc.get_traced_memory()[1] < 2e8
+    finally:
+        tracemalloc.stop()
+    assert len(str(caught.value)) < 1000
+
+
+@pytest.mark.parametrize("number", ["9" * 4000, "9" * 5000, "16385"])
+def test_huge_numbers_in_scen(tmp_path, number):
+    text = SCEN.replace("\t6\t4\t", f"\t{number}\t4\t")
+    with pytest.raises(MapError, match=r"line 2: ") as caught:
+        load_tasks(written(tmp_path / "a.scen", text), GRID)
+    assert len(str(caught.value)) < 1000
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.scen", SCEN),
+        ("t.csv", HEAD + 'arena,0.5,1,2,3.25,4.5\n"a,b",1,1,2,2,\narena,1e0,1,2,2,inf\n'),
+    ],
+)
+def test_damaged_files_are_read_or_refused(tmp_path, name, text):
+    path = tmp_path / name
+
+    def read(data):
+        path.write_bytes(data)
+        for task in load_tasks(path, GRID):
+            GRID.check_task(task.start, task.goal)
+
+    counts = read_all(read, mutations([text.encode(), text.encode() * 2], 1500, 1))
+    assert min(counts["read"], counts["refused"]) > 20
+
+
 # --- tasks of a map ---------------------------------------------------------------------------
 
 
@@ -141,6 +193,12 @@ def test_tasks_beside_a_moving_ai_map(tmp_path):
     assert len(tasks_of(str(path), GRID)) == 2
     written(tmp_path / "arena.map.scen", SCEN[: SCEN.index("3\tarena")])  # has precedence
     assert len(tasks_of(path, GRID)) == 1
+
+
+def test_names_with_no_room_for_another_suffix(tmp_path):
+    path = tmp_path / ("x" * 251 + ".map")
+    path.write_text("type octile\nheight 4\nwidth 6\nmap\n" + "......\n" * 4)
+    assert tasks_of(path, GRID) == []
 
 
 def test_other_maps_come_without_tasks(tmp_path):

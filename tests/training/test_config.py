@@ -6,12 +6,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
+from helpers.fuzzing import mutations, read_all
 from helpers.tiny_model import TINY
 
 from cbagan_ompl import ConfigError
 from cbagan_ompl.networks.config import RULES as NETWORK_RULES
 from cbagan_ompl.networks.config import NetworkConfig, Rule
-from cbagan_ompl.training.config import RULES, TrainingConfig
+from cbagan_ompl.training.config import PRESETS, RULES, TrainingConfig
 
 
 def test_paper_preset_is_the_papers_table() -> None:
@@ -45,7 +47,7 @@ def test_config_file_round_trip(tmp_path: Path, suffix: str) -> None:
         ("seed: 99999999999999999999", r"seed must be .* below 2\*\*63"),
         ("{self_attention: true, widths: [8, 8, 7, 8]}", "all widths but the first .* least 8"),
         ("[1, 2]", "holds lines such as"),
-        ("a: [", "neither JSON nor YAML"),
+        ("a: [", "no valid YAML"),
     ],
 )
 def test_bad_config_files(tmp_path: Path, text: str, message: str) -> None:
@@ -89,7 +91,7 @@ def test_assignments() -> None:
     ("assignment", "message"),
     [
         ("epochs", "--set takes KEY=VALUE, got 'epochs'"),
-        ("widths=[", r"--set widths=\[: neither JSON nor YAML"),
+        ("widths=[", r"--set 'widths=\[': no valid YAML"),
         ("epoch=1", "unknown option 'epoch'"),
         ("positive_weight=-0.5", "positive_weight must be at least 0"),
     ],
@@ -111,3 +113,77 @@ def test_a_recipe_for_another_network() -> None:
 def test_every_number_has_a_rule(kind: type[Any], rules: dict[str, Rule]) -> None:
     numbers = {option.name for option in fields(kind) if option.type in ("int", "float")}
     assert numbers <= rules.keys()
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"epochs": 10**30},
+        {"batch_size": 10**12},
+        {"widths": [10**9] * 3},
+        {"widths": [4] * 100},
+        {"scales": [2**40]},
+        {"stem": 10**6},
+        {"seed": 2**63},
+        {"generator_lr": float("inf")},
+        {"generator_lr": float("nan")},
+        {"generator_lr": 10**400},
+        {"clip_norm": "1e999"},
+        {"epochs": -1},
+        {"epochs": True},
+        {"precision": ["float32"]},
+        {7: 1},
+    ],
+)
+def test_values_beyond_all_bounds(values: dict[Any, Any]) -> None:
+    with pytest.raises(ConfigError):
+        TrainingConfig().updated(values)
+    if 7 not in values:
+        network = {name: value for name, value in values.items() if name in ("widths", "stem")}
+        with pytest.raises(ConfigError):
+            NetworkConfig(**network) if network else TrainingConfig(**values)
+
+
+def test_damaged_files_and_odd_values(tmp_path: Path) -> None:
+    path = tmp_path / "recipe.yaml"
+
+    def from_file(data: bytes) -> None:
+        path.write_bytes(data)
+        TrainingConfig.from_file(path)
+
+    valid = [yaml.safe_dump(preset.to_dict()).encode() for preset in PRESETS.values()]
+    short = b"epochs: 3\nwidths: [4, 4, 8]\n"
+    read_all(from_file, mutations([*valid, short, short], 200, seed=1))
+
+    def set_value(text: bytes) -> None:
+        for name in ("epochs", "widths", "clip_norm", "schedule", "symmetries", "none"):
+            TrainingConfig().with_assignments([f"{name}={text.decode()}"])
+
+    read_all(set_value, (text.encode() for text in _ODD_YAML))
+
+
+_ODD_YAML = (
+    '!!int ""',
+    "!!timestamp x",
+    "2001-13-01",
+    "&a [*a]",
+    "9" * 5000,
+    "1" + "0" * 400,
+    "[" * 500,
+    "!!python/object/apply:os.system [x]",
+    "!!binary x",
+    '"\\ud800"',
+    "\x00",
+    "{1: {2: 3}}",
+    "<<: x",
+    ".nan",
+    "-.inf",
+    "1e999",
+    "~",
+    "yes",
+    "!!set {a}",
+    "? [a]",
+    "1:2:3",
+    "[1, [2]]",
+    "-1",
+)

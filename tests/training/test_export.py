@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import hashlib
 import json
+import shutil
 import warnings
 from pathlib import Path
 
@@ -9,12 +11,12 @@ from helpers.tiny_model import TINY
 
 torch = pytest.importorskip("torch")
 
-from cbagan_ompl import ModelError
+from cbagan_ompl import ConfigError, ModelError
 from cbagan_ompl.inference import model_files
 from cbagan_ompl.inference.predictor import load_model
 from cbagan_ompl.networks.export_model import RegionModel
 from cbagan_ompl.training.checkpoints import best_generator, load_checkpoint
-from cbagan_ompl.training.export import export, model_card
+from cbagan_ompl.training.export import _is_card, export, model_card
 from cbagan_ompl.training.loop import train
 from cbagan_ompl.training.task_sources import DatasetSource
 
@@ -80,7 +82,9 @@ def test_record_card_and_manifest(exported: Path) -> None:
     assert f"{record['parameters']:,}" in card
     manifest = json.loads((exported.parent / "manifest.json").read_text())
     assert manifest["default"] == "tiny.pt"
-    assert manifest["files"]["tiny.pt"]["sha256"] == model_files.sha256(exported)
+    assert (
+        manifest["files"]["tiny.pt"]["sha256"] == hashlib.sha256(exported.read_bytes()).hexdigest()
+    )
 
 
 def test_a_second_export_keeps_the_default(checkpoint: Path, tmp_path: Path) -> None:
@@ -107,3 +111,37 @@ def test_export_to_where_nothing_can_be_written(checkpoint: Path, tmp_path: Path
 def test_export_needs_the_suffix(checkpoint: Path, tmp_path: Path) -> None:
     with pytest.raises(ModelError, match=r"ends in \.pt"):
         export(checkpoint, tmp_path / "model.onnx")
+
+
+@pytest.mark.parametrize("name", ["model.pt", "model.md", "manifest.json"])
+def test_export_writes_over_nothing_of_others(checkpoint: Path, tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("# Of somebody else: cbagan-ompl, manifest.json\n")
+    before = (tmp_path / name).read_bytes()
+    with pytest.raises(ModelError, match=rf"{name} exists, and .* --force"):
+        export(checkpoint, tmp_path / "model.pt")
+    assert (tmp_path / name).read_bytes() == before
+    assert [file.name for file in tmp_path.iterdir()] == [name]
+    export(checkpoint, tmp_path / "model.pt", force=True)
+    assert load_model(tmp_path / "model.pt").record["name"] == "model"
+    export(checkpoint, tmp_path / "model.pt")  # its own files it replaces
+
+
+def test_export_never_writes_over_its_checkpoint(checkpoint: Path, tmp_path: Path) -> None:
+    for name in ("best.pt", "model.md"):
+        source = tmp_path / name
+        shutil.copy(checkpoint, source)
+        with pytest.raises(ConfigError, match="it is what the command reads"):
+            export(source, source.with_suffix(".pt"), force=True)
+        assert source.read_bytes() == checkpoint.read_bytes()
+
+
+@pytest.mark.parametrize("stem", ["a" * 101, "a\nb", "a\udce9"])
+def test_names_that_a_model_cannot_have(checkpoint: Path, tmp_path: Path, stem: str) -> None:
+    with pytest.raises(ModelError, match="a model cannot be called"):
+        export(checkpoint, tmp_path / f"{stem}.pt")
+
+
+def test_cards_of_the_repository_are_known_as_cards() -> None:
+    cards = sorted((Path(__file__).parents[2] / "models").glob("*.md"))
+    assert cards
+    assert all(map(_is_card, cards))

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ from helpers.tiny_model import TINY
 
 torch = pytest.importorskip("torch")
 
-from cbagan_ompl import ConfigError, ModelError
+from cbagan_ompl import ConfigError
 from cbagan_ompl.training import loop
 from cbagan_ompl.training.checkpoints import load_checkpoint
 from cbagan_ompl.training.loop import train
@@ -136,9 +137,26 @@ def test_a_run_starts_from_the_weights_of_another(source: DatasetSource, tmp_pat
         train(source, wider, tmp_path / "wider", start_from=first["checkpoint"], progress=False)
 
 
-def test_resume_without_a_run(source: DatasetSource, tmp_path: Path) -> None:
-    with pytest.raises(ModelError, match="no such file"):
-        train(source, TINY, tmp_path, resume=True, progress=False)
+def test_resume_goes_on_where_a_run_ended_before_its_first_epoch(
+    source: DatasetSource, tmp_path: Path
+) -> None:
+    config = TINY.updated({"epochs": 1})
+    whole = train(source, config, tmp_path / "whole", device="cpu", progress=False)
+    (tmp_path / "run").mkdir()
+    # The best epoch is written before the last one.
+    shutil.copy(tmp_path / "whole" / "best.pt", tmp_path / "run")
+    run = train(source, config, tmp_path / "run", resume=True, device="cpu", progress=False)
+    assert run["test"] == whole["test"]
+
+
+@pytest.mark.parametrize("name", ["last.pt", "best.pt", "log.jsonl"])
+def test_a_run_writes_over_no_file_that_it_did_not_write(
+    source: DatasetSource, tmp_path: Path, name: str
+) -> None:
+    (tmp_path / name).write_text("of somebody else")
+    with pytest.raises(ConfigError, match=f"or another {name}"):
+        train(source, TINY, tmp_path, progress=False)
+    assert (tmp_path / name).read_text() == "of somebody else"
 
 
 def test_output_that_is_a_file(source: DatasetSource, tmp_path: Path) -> None:

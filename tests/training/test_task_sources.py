@@ -25,7 +25,7 @@ from cbagan_ompl.training.task_sources import SyntheticSchedule, synthetic_sourc
 
 @pytest.mark.parametrize("option", ["maps", "held_out", "jobs"])
 def test_schedules_that_make_no_sense(option: str) -> None:
-    with pytest.raises(ConfigError, match=f"{option} must be at least 1"):
+    with pytest.raises(ConfigError, match=f"{option} is a whole number of at least 1"):
         SyntheticSchedule(**{option: 0})
 
 
