@@ -35,7 +35,7 @@ from cbagan_ompl.networks.config import NetworkConfig
 from cbagan_ompl.networks.export_model import RegionModel
 from cbagan_ompl.networks.factory import make_generator
 from cbagan_ompl.planning.compat import ompl_version
-from cbagan_ompl.sampling.heatmap import pixel_pair
+from cbagan_ompl.sampling.pixels import pixel_pair
 
 RANGE, TIME = 20.0, 2.0
 Endpoints = tuple[NDArray[np.float64], NDArray[np.float64]]

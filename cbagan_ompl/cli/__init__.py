@@ -76,6 +76,19 @@ def execute(args: argparse.Namespace) -> int:
         return status
 
 
+<<<<<<< HEAD
+def load_commands() -> None:
+    """Import what the commands need, which takes a second: not done with this module.
+
+    So the command line can handle Ctrl-C and SIGTERM before.
+    """
+    # Damaged images are errors of ours, and need no other line.
+    os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
+    from . import benchmark, dataset, evaluate, plan, train  # noqa: F401
+
+
+=======
+>>>>>>> main
 def _explain(error: Exception) -> tuple[int, str]:
     """Return the exit status of an error, and what to say of it."""
     if isinstance(error, CbaganOmplError):

@@ -11,6 +11,9 @@ import numpy as np
 
 from ..errors import ConfigError, MissingDependencyError, show
 
+# What NumPy recommends for seeds has 128 bits.
+_LARGEST_SEED = 2**128
+
 
 def finite_number(name: str, value: float, least: float) -> float:
     """Return a number as a float.
@@ -111,6 +114,31 @@ def check_fraction(name: str, value: float) -> None:
 def is_finite_number(value: object) -> bool:
     """Return whether a value is a finite real number: no text, no truth value, no array."""
     return isfinite(_to_float(value))
+
+
+def random_generator(seed: SupportsIndex | np.random.Generator | None) -> np.random.Generator:
+    """Return the generator of a seed: a new one for a whole number, itself for a generator.
+
+    Args:
+        seed: a whole number of at least 0, or a generator; None for one that nobody can repeat.
+
+    Raises:
+        ConfigError: neither of them.
+
+    Example:
+        >>> random_generator(1).random() == random_generator(1).random()
+        True
+    """
+    return np.random.default_rng(check_seed(seed))
+
+
+def check_seed(
+    seed: SupportsIndex | np.random.Generator | None,
+) -> int | np.random.Generator | None:
+    """Return a seed, a NumPy integer as an int; arguments and errors as for `random_generator`."""
+    if seed is None or isinstance(seed, np.random.Generator):
+        return seed
+    return whole_number("seed", seed, 0, _LARGEST_SEED)
 
 
 def require(package: str, extra: str) -> None:

@@ -28,7 +28,8 @@ from ..errors import ConfigError, DatasetError, show
 from ..map_generators import MAP_GENERATORS, MIN_SIZE, check_generators
 from ..map_generators.randomization import randomized_map
 from ..maps.grid_map import GridMap
-from ..sampling.heatmap import REGION_THRESHOLD, pixel_pair
+from ..sampling.heatmap import REGION_THRESHOLD
+from ..sampling.pixels import pixel_pair
 from .augmentation import augment
 from .dataset import MAX_SIZE, Tasks, check_pixels
 from .geodesic_labels import geodesic_label

@@ -8,6 +8,9 @@ from __future__ import annotations
 
 from math import floor
 
+import numpy as np
+from numpy.typing import NDArray
+
 # Two crossings closer than this (as a fraction of the segment) count as one through the corner.
 _TIE = 1e-12
 
@@ -86,3 +89,19 @@ def segment_is_free(  # noqa: C901 - the inner loop of every planner, so nothing
         if not cells[cell]:
             return False
     return True
+
+
+def pixels_are_free(free: NDArray[np.bool_], pixels: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return whether points lie in free pixels; outside the map nothing is free.
+
+    Args:
+        free: (H, W), true where free.
+        pixels: pixel coordinates (u, v), shape (..., 2).
+
+    Returns:
+        (...).
+    """
+    within = (pixels >= 0) & (pixels < free.shape[::-1])
+    inside = np.asarray(within.all(axis=-1))
+    indices = np.where(inside[..., None], pixels, 0).astype(np.intp)
+    return np.asarray(inside & free[indices[..., 1], indices[..., 0]])

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..common.validation import is_finite_number
 from ..errors import TaskError, show
 
 if TYPE_CHECKING:
@@ -77,14 +78,27 @@ def _check_free(grid: GridMap, role: str, point: ArrayLike) -> NDArray[np.float6
     return position
 
 
-def _check_position(grid: GridMap, role: str, point: ArrayLike) -> NDArray[np.float64]:
+def check_point(role: str, point: ArrayLike) -> NDArray[np.float64]:
+    """Return a point as a (2,) array.
+
+    Args:
+        role: of the point, for the message.
+        point: (x, y), any real numbers.
+
+    Raises:
+        TaskError: not two finite numbers; texts and truth values are none.
+    """
     try:
-        given = np.asarray(point)
-        position = given.astype(np.float64) if given.dtype.kind in "iufO" else np.empty(0)
-    except Exception:  # whatever the classes of odd values raise
-        position = np.empty(0)
-    if position.shape != (2,) or not np.isfinite(position).all():
+        values = np.asarray(point).tolist()
+    except Exception:  # rows of different lengths, or whatever the class raises
+        values = None
+    if not (isinstance(values, list) and len(values) == 2 and all(map(is_finite_number, values))):
         raise TaskError(f"{role} must be two finite numbers x, y in world units, got {show(point)}")
+    return np.array([float(value) for value in values])
+
+
+def _check_position(grid: GridMap, role: str, point: ArrayLike) -> NDArray[np.float64]:
+    position = check_point(role, point)
     column, row = np.floor(grid.to_pixel(position)).tolist()
     if not (0 <= column < grid.width and 0 <= row < grid.height):
         low, high = grid.bounds

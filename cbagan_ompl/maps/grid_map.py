@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..common.validation import finite_number, is_finite_number
-from ..errors import MapError
-from .collision import segment_is_free
+from ..errors import MapError, show
+from .collision import pixels_are_free, segment_is_free
 from .connectivity import label_components
 from .endpoints import Endpoints, check_endpoints, snap_to_free
-from .frames import Affine, pixel_from_world, world_from_pixel
+from .frames import Affine, as_points, check_frame, pixel_from_world, world_from_pixel
 from .inflation import erode
 from .loading import read_map
 from .occupancy import read_costmap, read_occupancy_grid
-from .raw_map import RawMap, check_cells, check_origin, check_resolution
+from .raw_map import RawMap, check_cells, check_name, check_origin, check_resolution, check_unknown
 
 # Inflated maps that a map keeps, so that a plan on it again need not make them again.
 _KEPT_RADII = 4
@@ -48,9 +48,8 @@ class GridMap:
             not; None where no pixel is so. It serves figures alone.
 
     Raises:
-        MapError: not a 2-D array of truth values or of 0 and 1, too large (see
-            :func:`cbagan_ompl.maps.raw_map.check_map_size`), no free pixel, or a resolution or
-            origin that is not finite (resolution also positive).
+        MapError: an argument that makes no sense, a map too large (see
+            :func:`cbagan_ompl.maps.raw_map.check_map_size`), or one without a free pixel.
 
     Example:
         >>> grid = GridMap([[1, 1, 0], [1, 0, 0]], resolution=0.5)
@@ -67,12 +66,13 @@ class GridMap:
         name: str = "map",
         unknown: NDArray[np.bool_] | None = None,
     ) -> None:
+        self.name = check_name(name)
         self.free: NDArray[np.bool_] = check_cells(free, name)
         self.free.setflags(write=False)
         self.resolution = check_resolution(resolution, name)
         self.origin = check_origin(origin, name)
-        self.name = name
-        self.unknown = unknown
+        self.unknown = check_unknown(unknown, self.shape, name)
+        check_frame(self.resolution, self.origin, self.shape, name)
         # The map before it was inflated. Weakly, since that one keeps this one.
         self._bare: ReferenceType[GridMap] | None = None
         self._inflated: dict[float, GridMap] = {}
@@ -119,8 +119,7 @@ class GridMap:
             height: rows.
             resolution: metres per cell.
             origin: pose (x, y, yaw) of the lower left corner, metres and radians.
-            free_thresh: cells up to this probability of an obstacle are free, 0 to 1; 0.25 is
-                nav2's.
+            free_thresh: cells up to this probability of an obstacle are free; 0.25 is nav2's.
             unknown_is_free: whether unknown cells are free.
             name: what the map is called in messages and results.
 
@@ -220,12 +219,12 @@ class GridMap:
         return world_from_pixel(self.resolution, self.origin, self.height)
 
     def to_pixel(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Return world points, shape (..., 2), as continuous pixel coordinates (u, v)."""
-        return self.pixel_from_world(np.asarray(points, dtype=np.float64))
+        """Return world points as continuous pixel coordinates (u, v), both of shape (..., 2)."""
+        return self.pixel_from_world(as_points(points))
 
     def to_world(self, pixels: ArrayLike) -> NDArray[np.float64]:
-        """Return continuous pixel coordinates (u, v), shape (..., 2), as world points."""
-        return self.world_from_pixel(np.asarray(pixels, dtype=np.float64))
+        """Return continuous pixel coordinates (u, v) as world points, both of shape (..., 2)."""
+        return self.world_from_pixel(as_points(pixels))
 
     @property
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -244,19 +243,20 @@ class GridMap:
         Returns:
             A ``bool`` for one point, which OMPL's callbacks may hand on; else an array (...).
         """
-        pixels = self.to_pixel(points)
-        within = (pixels >= 0) & (pixels < (self.width, self.height))
-        inside: NDArray[np.bool_] = np.asarray(within.all(axis=-1))
-        indices = np.where(inside[..., None], pixels, 0).astype(np.intp)
-        result = np.asarray(inside & self.free[indices[..., 1], indices[..., 0]])
+        result = pixels_are_free(self.free, self.to_pixel(points))
         return bool(result) if result.ndim == 0 else result
 
     def path_is_free(self, path: ArrayLike) -> bool:
         """Return whether a polyline of world points, shape (N, 2), stays in free pixels.
 
         The check is exact (see :func:`cbagan_ompl.maps.collision.segment_is_free`).
+
+        Raises:
+            MapError: not an array of that shape.
         """
         pixels = self.to_pixel(path)
+        if pixels.ndim != 2:
+            raise MapError(f"a path has shape (N, 2), this one {pixels.shape}")
         if len(pixels) == 1:
             return bool(self.is_free(path).all())
         return all(
@@ -280,16 +280,12 @@ class GridMap:
             MapError: radius negative or not finite, or nothing stays free.
         """
         if not is_finite_number(radius) or radius < 0:
-            raise MapError(f"the robot radius must be a length of at least 0, got {radius!r}")
+            raise MapError(f"the robot radius must be a length of at least 0, got {show(radius)}")
+        radius = float(radius)
         if radius == 0 or self.free.all():
             return self
         if radius not in self._inflated:
-            free = erode(self.free, radius / self.resolution)
-            if not free.any():
-                raise MapError(
-                    f"{self.name}: a robot of radius {radius} fits nowhere on this map "
-                    f"({self.width} x {self.height} pixels of {self.resolution})"
-                )
+            free = erode(self.free, radius, self.resolution, self.name)
             name = f"{self.name} (inflated by {radius:g})"
             grown = GridMap(free, self.resolution, self.origin, name=name, unknown=self.unknown)
             grown._bare = ref(self.bare)

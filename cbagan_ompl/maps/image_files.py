@@ -37,9 +37,6 @@ _MAX_DECODED = 3 * MAX_PIXELS
 
 _PNG = b"\x89PNG\r\n\x1a\n"
 
-# Log level of OpenCV at which it prints nothing.
-_SILENT = 0
-
 # Pixels that are looked up in a table at a time.
 _BLOCK = 2**20
 
@@ -162,15 +159,11 @@ def _measure(data: bytes) -> Header:
 
 
 def _decode(data: bytes) -> NDArray[np.uint8 | np.uint16]:
-    # Errors are raised here, and need not be printed as well.
-    level = cv2.setLogLevel(_SILENT)  # type: ignore[attr-defined]
     try:
         # None for damaged files, whatever the annotations of OpenCV say.
         values: Any = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     except Exception as error:  # cv2.error, and those of its Python bindings
         raise damaged(str(getattr(error, "err", error))) from error
-    finally:
-        cv2.setLogLevel(level)  # type: ignore[attr-defined]
     if values is None or values.dtype not in (np.uint8, np.uint16):
         raise damaged("OpenCV reads no pixels")
     if values.ndim == 3 and values.shape[2] not in (3, 4):

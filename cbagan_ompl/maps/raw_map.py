@@ -103,6 +103,34 @@ def check_cells(free: ArrayLike, name: str) -> NDArray[np.bool_]:
     return mask
 
 
+def check_name(name: str) -> str:
+    """Return the name of a map.
+
+    Raises:
+        MapError: it is no text.
+    """
+    if not isinstance(name, str):
+        raise MapError(f"the name of a map is a text, got {show(name)}")
+    return name
+
+
+def check_unknown(
+    unknown: NDArray[np.bool_] | None, shape: tuple[int, int], name: str
+) -> NDArray[np.bool_] | None:
+    """Return the mask of unknown pixels.
+
+    Raises:
+        MapError: it is neither None nor a boolean array of the map's shape.
+    """
+    if unknown is not None and not (
+        isinstance(unknown, np.ndarray) and unknown.shape == shape and unknown.dtype == np.bool_
+    ):
+        raise MapError(
+            f"{name}: unknown is an array of booleans of shape {shape}, got {show(unknown)}"
+        )
+    return unknown
+
+
 def check_resolution(resolution: float, name: str) -> float:
     """Return a resolution as a float.
 
@@ -125,10 +153,7 @@ def check_origin(origin: Origin | None, name: str) -> Origin | None:
     """
     if origin is None:
         return None
-    if not (
-        isinstance(origin, Sequence | np.ndarray)
-        and len(origin) == 3
-        and all(map(is_finite_number, origin))
-    ):
+    pose = origin.tolist() if isinstance(origin, np.ndarray) else origin
+    if not (isinstance(pose, Sequence) and len(pose) == 3 and all(map(is_finite_number, pose))):
         raise MapError(f"{name}: origin is (x, y, yaw) with finite numbers, got {show(origin)}")
-    return float(origin[0]), float(origin[1]), float(origin[2])
+    return float(pose[0]), float(pose[1]), float(pose[2])

@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Any
 
-from ..errors import PlannerError
+from ..errors import PlannerError, show
 from ..sampling.adaptation import AdaptiveMixture
-from ..sampling.heatmap import Heatmap
+from ..sampling.heatmap import Heatmap, check_heatmap
 from ..sampling.options import OPTIMIZING_SHARPNESS, SamplerOptions
 from ..sampling.sampler import HeatmapSampler
 from . import compat, ompl_samplers
-from .compat import ob, ou
+from .compat import ob, og, ou
 from .goal_injection import InjectedGoal
+from .goal_monitor import GoalMonitor, goal_monitor
 from .hooks import (
     GOAL_INJECTION,
     STATE_SAMPLER,
     VALID_STATE_SAMPLER,
+    class_name,
     hook_of,
     keeps_sampler,
     stops_at_first,
 )
-from .monitor import PlannerMonitor, is_informed, is_monitored
+from .monitor import PlannerMonitor, is_informed, is_monitored, release_forgotten
 from .states import StateAccess, position_bounds, state_access
 
 # OMPL's range of a planner that was given none, as a fraction of the extent of the space.
@@ -53,9 +56,12 @@ class Attachment:
         >>> attachment.detach()
     """
 
-    def __init__(self, hook: str, sampler: HeatmapSampler, undo: Callable[[], None]) -> None:
+    def __init__(
+        self, hook: str, sampler: HeatmapSampler, monitor: PlannerMonitor, undo: Callable[[], None]
+    ) -> None:
         self.hook = hook
         self._sampler = sampler
+        self._monitor = monitor
         self._undo: Callable[[], None] | None = undo
 
     @property
@@ -68,10 +74,26 @@ class Attachment:
 
         The planner is cleared, since samplers that it has made go only with its tree; solution
         paths stay in the problem definition. Calling it again does nothing.
+
+        Raises:
+            PlannerError: the planner is in the middle of a solve, from one of whose callbacks this
+                is called: it would go on in a tree that is no more.
         """
-        if self._undo is not None:
-            self._undo()
-            self._undo = None
+        if self._undo is not None and self._monitor.is_planning(sys._getframe(1)):
+            raise PlannerError(
+                "detach() was called while the planner plans, which would end in a crash: call it "
+                "after solve() has returned"
+            )
+        self.force_detach()
+
+    def force_detach(self) -> None:
+        """Detach without a look at whether the planner plans, where it is known that it does not.
+
+        An event of ``ompl.tools.Benchmark`` after a run without any path looks like a solve.
+        """
+        undo, self._undo = self._undo, None
+        if undo is not None:
+            undo()
 
     def __enter__(self) -> Attachment:
         return self
@@ -94,8 +116,11 @@ def attach(
     goal were set. What the planner has done so far is cleared, because samplers that it has made
     go only with its tree. Its options stay as they are but for what the hook needs: the goal bias
     under goal injection, and for informed sampling under a StateSampler, rejection instead of
-    direct sampling. For another planner, start or goal: detach, set it, attach again. Until
-    :meth:`Attachment.detach` the planner and the heat map keep each other alive.
+    direct sampling. For another start or goal: detach, set it, attach again. Planners other than
+    the attached one get the goal itself, also while it is attached. Until
+    :meth:`Attachment.detach` the setup, the planner and the heat map keep each other alive; where
+    nothing else refers to them any more, they are let go by the next ``attach`` or by Python's
+    garbage collector.
 
     Args:
         setup: an ``ompl.geometric.SimpleSetup``.
@@ -111,10 +136,11 @@ def attach(
         A handle with ``.hook``, ``.sample_counts`` and ``.detach()``.
 
     Raises:
-        PlannerError: no planner is set, no hook of this build reaches it, it samples a heat map
-            already, its space has no (x, y), the start or goal is missing, or the goal cannot be
-            sampled.
-        HeatmapError: the heat map is 0 everywhere in the bounds of the space.
+        PlannerError: ``setup`` is no SimpleSetup, no planner is set, no hook of this build reaches
+            it, it samples a heat map already, its space has no (x, y), the start or goal is
+            missing, or the goal cannot be sampled.
+        HeatmapError: not a :class:`Heatmap`, or one that is 0 everywhere in the bounds of the
+            space.
         ConfigError: an option that makes no sense, see :class:`SamplerOptions`.
 
     Example:
@@ -132,9 +158,10 @@ def attach(
         ('goal-injection', True)
     """
     options = SamplerOptions.of(options, changes)
-    planner = setup.getPlanner()
+    check_heatmap(heatmap)
+    planner = _planner_of(setup)
     _check_attachable(setup, planner)
-    name = _class_name(planner)
+    name = class_name(planner)
     hook = hook_of(name)
     if options.sharpness is None:
         sharpness = 1.0 if stops_at_first(name) else OPTIMIZING_SHARPNESS
@@ -142,9 +169,11 @@ def attach(
     rng = options.generator()
     space = setup.getStateSpace()
     states = state_access(space, rng)
-    monitor = PlannerMonitor(setup, states)
+    release_forgotten()
+    injects = hook == GOAL_INJECTION
+    monitor = (goal_monitor if injects else PlannerMonitor)(setup, states)
     mixture = None
-    if hook == GOAL_INJECTION:
+    if injects:
         mixture = AdaptiveMixture(heatmap, options.adaptation, _reach_of(planner), monitor)
     sampler = HeatmapSampler(heatmap, replace(options, seed=rng), monitor, mixture)
     sampler.keep_inside(*position_bounds(space))
@@ -160,7 +189,21 @@ def attach(
         planner.clear()  # first: a planner without samplers makes none while its options change
         undo_hook()
 
-    return Attachment(hook, sampler, undo)
+    return Attachment(hook, sampler, monitor, undo)
+
+
+def _planner_of(setup: Any) -> Any:
+    """Return the planner of a setup, which may be None; raise if it is no setup."""
+    if not isinstance(setup, og.SimpleSetup):
+        raise PlannerError(
+            f"attach takes an ompl.geometric.SimpleSetup, with its planner, not {show(setup)}"
+        )
+    planner = setup.getPlanner()
+    if planner is not None and setup.getPlanner() is not planner:
+        # OMPL 1.x makes a new object at each call for a planner that C++ has made. One that was
+        # set stays the same.
+        setup.setPlanner(planner)
+    return planner
 
 
 def _check_attachable(setup: Any, planner: Any) -> None:
@@ -177,15 +220,6 @@ def _check_attachable(setup: Any, planner: Any) -> None:
         raise PlannerError(
             "this planner samples a heat map already: call detach() of its attachment first"
         )
-
-
-def _class_name(planner: Any) -> str:
-    """Return OMPL's name of the class, also for Python subclasses of it."""
-    names = compat.planner_names()
-    return next(
-        (kind.__name__ for kind in type(planner).__mro__ if kind.__name__ in names),
-        type(planner).__name__,
-    )
 
 
 def _reach_of(planner: Any) -> float:
@@ -256,6 +290,7 @@ def _inject_goals(wiring: _Wiring) -> Callable[[], None]:
     setup, planner = wiring.setup, wiring.planner
     original, bias = setup.getGoal(), planner.getGoalBias()
     si = setup.getSpaceInformation()
+    assert isinstance(wiring.monitor, GoalMonitor)
     injected = InjectedGoal(si, original, wiring.states, wiring.sampler, wiring.monitor)
     setup.setGoal(injected)
     wiring.monitor.set_injected_fraction(1.0)

@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
+from threading import Lock
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import MissingDependencyError, PlannerError
+from ..errors import MissingDependencyError, PlannerError, show
 
 try:
     import ompl
@@ -201,9 +202,9 @@ def planner_class(name: str) -> Any:
         PlannerError: this build has no such planner.
     """
     names = planner_names()
-    if name not in names:
+    if not (isinstance(name, str) and name in names):
         raise PlannerError(
-            f"there is no planner {name!r} to use on OMPL {ompl_version()}; there are "
+            f"there is no planner {show(name)} to use on OMPL {ompl_version()}; there are "
             f"{', '.join(sorted(names))}"
         )
     return getattr(og, name)
@@ -238,10 +239,30 @@ def seed_ompl(seed: int) -> None:
 
 @contextmanager
 def log_level(level: Any) -> Iterator[None]:
-    """Set OMPL's log level for the duration of a block."""
-    before = ou.getLogLevel()
-    ou.setLogLevel(level)
+    """Let OMPL's log say no more than a level for the duration of a block.
+
+    The level is one for the whole process. While several blocks are open, in several threads, the
+    quietest of them counts; the last one to end restores what was set before the first one.
+    """
+    with _log_lock:
+        if not _log_levels:
+            _log_levels.append(ou.getLogLevel())
+        _log_levels.append(level)
+        ou.setLogLevel(max(_log_levels, key=_quietness))
     try:
         yield
     finally:
-        ou.setLogLevel(before)
+        with _log_lock:
+            _log_levels.remove(level)
+            ou.setLogLevel(max(_log_levels, key=_quietness))
+            if len(_log_levels) == 1:
+                _log_levels.clear()
+
+
+def _quietness(level: Any) -> int:
+    return int(getattr(level, "value", level))
+
+
+_log_lock = Lock()
+# The level before the first open block, followed by those of the open blocks.
+_log_levels: list[Any] = []

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 from ..sampling.sampler import HeatmapSampler
 from .compat import ob
-from .monitor import PlannerMonitor
+from .goal_monitor import GoalMonitor
 from .states import StateAccess
 
 # What RRT-like planners compare their number of goal states with: never enough.
@@ -37,7 +38,7 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
         original: Any,
         states: StateAccess,
         sampler: HeatmapSampler,
-        monitor: PlannerMonitor,
+        monitor: GoalMonitor,
     ) -> None:
         super().__init__(si)
         self._threshold = original.getThreshold()
@@ -50,23 +51,33 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
     def distanceGoal(self, state: Any) -> float:  # noqa: N802
         """Return the distance to the original goal; planners ask it for every new node."""
         distance: float = self._original.distanceGoal(state)
-        x, y = self._states.read(state)
-        self._sampler.on_new_node(x, y, distance < self._threshold)
+        monitor = self._monitor
+        monitor.nodes += 1
+        if monitor.is_trusted:
+            x, y = self._states.read(state)
+            in_goal = distance < self._threshold
+            self._sampler.on_new_node(x, y, in_goal)
+            if in_goal:
+                monitor.note_reached()
         return distance
 
     def maxSampleCount(self) -> int:  # noqa: N802
         """Return a number without limit to the planner, the original's number to other callers."""
-        return _ENDLESS if self._monitor.is_sampling() else int(self._original.maxSampleCount())
+        monitor = self._monitor
+        monitor.counts_asked += 1
+        return _ENDLESS if monitor.is_sampling() else int(self._original.maxSampleCount())
 
     def couldSample(self) -> bool:  # noqa: N802
-        """Return True, as the original does."""
+        """Return True, as the original does; the planners that injection is for never ask."""
+        self._monitor.note_other()
         return True
 
     def sampleGoal(self, state: Any) -> None:  # noqa: N802
         """Sample the heat map for the planner, the original goal for other callers."""
         monitor = self._monitor
-        sampling = monitor.is_sampling()
-        monitor.note_sample()
+        monitor.check_asker()
+        sampling = monitor.takes_sample(sys._getframe(1))
+        monitor.counts_asked = 0
         if sampling:
             self._sampler.begin()
         if not sampling or (not monitor.has_solution and self._is_goals_turn()):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
-from ..errors import ConfigError
+from ..errors import ConfigError, ModelError, show
 from ..maps.grid_map import GridMap
 from ..sampling.heatmap import Heatmap
 
@@ -56,8 +56,8 @@ def heatmap_source(
         ConfigError: an unknown sampler, or options that do not go together.
         ModelError: an unusable model file.
     """
-    if sampler not in SAMPLERS:
-        raise ConfigError(f"there is no sampler {sampler!r}; there are {', '.join(SAMPLERS)}")
+    if not (isinstance(sampler, str) and sampler in SAMPLERS):
+        raise ConfigError(f"there is no sampler {show(sampler)}; there are {', '.join(SAMPLERS)}")
     if sampler != LEARNED and (model is not None or heatmap is not None):
         raise ConfigError(
             f"the {sampler} sampler uses no model and no heat map: leave them out, or choose the "
@@ -71,6 +71,8 @@ def heatmap_source(
     if sampler == LEARNED:
         from ..inference.predictor import Predictor, load_model
 
+        if not isinstance(model, Predictor | str | PathLike | None):
+            raise ModelError(f"model is a loaded model or the file of one, got {show(model)}")
         return sampler, (model if isinstance(model, Predictor) else load_model(model)).predict
     return sampler, _CONTROLS.get(sampler)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from ..errors import PlannerError
 from .compat import BINDINGS, HAS_STATE_SAMPLER_ALLOCATOR, ompl_version, planner_names
@@ -27,12 +28,18 @@ class PlannerTraits:
         keeps_sampler: whether it makes its sampler when it is set up and keeps it from then on.
         hangs_with: the bindings, see :data:`.compat.BINDINGS`, with which a solve never returns
             when its termination condition is a Python function; None for no bindings.
+        hangs_at_optimum: whether a solve never returns once it has a path as short as the straight
+            line.
+        asks_in_thread: whether it asks its goal from a thread of its own, which hangs or crashes
+            where the goal is written in Python.
     """
 
     hook: str
     stops_at_first: bool = False
     keeps_sampler: bool = False
     hangs_with: str | None = None
+    hangs_at_optimum: bool = False
+    asks_in_thread: bool = False
 
 
 #: Every planner that some hook reaches on some build, by OMPL's name of its class.
@@ -50,8 +57,10 @@ PLANNERS = {
     "LazyPRMstar": PlannerTraits(STATE_SAMPLER, keeps_sampler=True),
     "LazyRRT": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
     "PDST": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
-    "PRM": PlannerTraits(VALID_STATE_SAMPLER, stops_at_first=True, hangs_with="nanobind"),
-    "PRMstar": PlannerTraits(VALID_STATE_SAMPLER, hangs_with="nanobind"),
+    "PRM": PlannerTraits(
+        VALID_STATE_SAMPLER, stops_at_first=True, hangs_with="nanobind", asks_in_thread=True
+    ),
+    "PRMstar": PlannerTraits(VALID_STATE_SAMPLER, hangs_with="nanobind", asks_in_thread=True),
     "ProjEST": PlannerTraits(VALID_STATE_SAMPLER, stops_at_first=True),
     "RRT": PlannerTraits(GOAL_INJECTION, stops_at_first=True),
     "RRTConnect": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
@@ -59,9 +68,9 @@ PLANNERS = {
     "RRTsharp": PlannerTraits(STATE_SAMPLER),
     "RRTstar": PlannerTraits(GOAL_INJECTION),
     "SBL": PlannerTraits(VALID_STATE_SAMPLER, stops_at_first=True),
-    "SORRTstar": PlannerTraits(GOAL_INJECTION),
-    "SPARS": PlannerTraits(VALID_STATE_SAMPLER, hangs_with="boost"),
-    "SPARStwo": PlannerTraits(VALID_STATE_SAMPLER, hangs_with="boost"),
+    "SORRTstar": PlannerTraits(GOAL_INJECTION, hangs_at_optimum=True),
+    "SPARS": PlannerTraits(VALID_STATE_SAMPLER, hangs_with="boost", asks_in_thread=True),
+    "SPARStwo": PlannerTraits(VALID_STATE_SAMPLER, hangs_with="boost", asks_in_thread=True),
     "SST": PlannerTraits(STATE_SAMPLER),
     "STRIDE": PlannerTraits(VALID_STATE_SAMPLER, stops_at_first=True),
     "TRRT": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
@@ -119,6 +128,25 @@ def keeps_sampler(planner: str) -> bool:
 def hangs_on_python_termination(planner: str) -> bool:
     """Return whether a solve with a termination condition in Python never returns."""
     return planner in PLANNERS and PLANNERS[planner].hangs_with == BINDINGS
+
+
+def hangs_at_optimum(planner: str) -> bool:
+    """Return whether a solve never returns once it has a path as short as the straight line."""
+    return planner in PLANNERS and PLANNERS[planner].hangs_at_optimum
+
+
+def asks_in_thread(planner: str) -> bool:
+    """Return whether a planner asks its goal from a thread of its own."""
+    return planner in PLANNERS and PLANNERS[planner].asks_in_thread
+
+
+def class_name(planner: Any) -> str:
+    """Return OMPL's name of the class of a planner, also for Python subclasses of it."""
+    names = planner_names()
+    return next(
+        (kind.__name__ for kind in type(planner).__mro__ if kind.__name__ in names),
+        type(planner).__name__,
+    )
 
 
 def _list_reached() -> str:

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import atexit
+import gc
+import sys
 import weakref
 from math import inf
+from threading import get_ident
 from time import perf_counter
+from types import CodeType, FrameType
 from typing import Any
 
 import numpy as np
@@ -23,8 +27,9 @@ class PlannerMonitor:
     """The state of a planner, read through the only references that callbacks have to it.
 
     A callback that refers to its planner closes a reference cycle through C++, which no garbage
-    collector sees. :meth:`release` cuts it; at interpreter exit all are cut, because OMPL 2.0
-    reports every object that is left.
+    collector sees. :meth:`release` cuts it: when the planner is detached, when nobody else refers
+    to the planner and its setup any more (:func:`release_forgotten`), and at interpreter exit,
+    because OMPL 2.0 reports every object that is left.
 
     Attributes:
         injected_fraction: fraction of the planner's samples that it asks the goal for.
@@ -35,39 +40,46 @@ class PlannerMonitor:
     """
 
     def __init__(self, setup: Any, states: StateAccess) -> None:
+        self._setup = setup
         self._planner = setup.getPlanner()
         self._problem = setup.getProblemDefinition()
         self._goal = setup.getGoal()
         self._states = states
         self._is_informed = is_informed(self._planner)
         self._counts_iterations = hasattr(self._planner, "numIterations")
-        self._last_iteration = self._asked_iteration = self._paths = 0
         self.injected_fraction = 1.0
+        self._call: tuple[CodeType, int, int] | None = None
+        self._paths_at_call = 0
 
-    def is_sampling(self) -> bool:
-        """Return whether the planner's main loop asks for a goal, rather than OMPL around it.
+    def note_call(self, caller: FrameType) -> None:
+        """Note that OMPL asks for a sample, for :meth:`is_planning`.
 
-        An informed sampler that is being built, and the path simplifier, ask the goal for samples
-        as well, and must get the goal itself. RRT*-like planners count iterations, ask how many
-        samples there are in each, from 1 on, and take at most one; their path is there when their
-        loop has ended. The others stop at their first solution.
+        Args:
+            caller: the frame that has called OMPL.
         """
-        if self._planner is None:
-            return False
-        if self._counts_iterations:
-            iteration, paths = self._planner.numIterations(), self._problem.getSolutionCount()
-            if iteration != self._asked_iteration:
-                self._asked_iteration, self._paths = iteration, paths
-            return iteration not in (0, self._last_iteration) and paths == self._paths
-        # A solution may be older than the tree, after the planner alone was cleared.
-        return not (
-            self._problem.hasExactSolution() and planner_data(self._planner).numGoalVertices()
-        )
+        if self._problem is not None:
+            self._paths_at_call = self._problem.getSolutionCount()
+            self._call = caller.f_code, id(caller), caller.f_lasti
 
-    def note_sample(self) -> None:
-        """Remember the iteration that has had its sample."""
-        if self._counts_iterations and self._planner is not None:
-            self._last_iteration = self._planner.numIterations()
+    def is_planning(self, caller: FrameType | None) -> bool:
+        """Return whether the planner is in the middle of a solve, as far as can be seen.
+
+        OMPL does not tell. But a frame that has called OMPL, which has asked for a sample, stands
+        at that call until it returns. Paths are added at the end of a solve alone.
+
+        Args:
+            caller: the frame that wants to know; it has called Python, not OMPL.
+        """
+        if self._call is None or self._problem.getSolutionCount() != self._paths_at_call:
+            return False
+        stacks: dict[int, FrameType | None] = {**sys._current_frames()}
+        stacks[get_ident()] = None if caller is None else caller.f_back
+        for frame in stacks.values():
+            while frame is not None:
+                if self._call == (frame.f_code, id(frame), frame.f_lasti):
+                    return True
+                frame = frame.f_back
+        return False
 
     @property
     def has_solution(self) -> bool:
@@ -117,9 +129,18 @@ class PlannerMonitor:
         """Return whether this is the monitor of a planner."""
         return self._planner is planner
 
+    def is_forgotten(self) -> bool:
+        """Return whether nothing but this monitor and OMPL refers to the setup and its planner."""
+        # Each count includes the argument of the call; the setup's C++ object holds the planner.
+        return (
+            self._setup is not None
+            and sys.getrefcount(self._setup) <= 2
+            and sys.getrefcount(self._planner) <= 3
+        )
+
     def release(self) -> None:
         """Let go of the planner and its task."""
-        self._planner = self._problem = self._goal = None
+        self._planner = self._problem = self._goal = self._setup = self._call = None
 
     def _endpoints(self) -> InformedSet:
         state = new_state(self._planner.getSpaceInformation().getStateSpace())
@@ -168,7 +189,23 @@ def is_monitored(planner: Any) -> bool:
     return any(monitor.refers_to(planner) for monitor in _alive)
 
 
+def release_forgotten() -> None:
+    """Let go of the planners that nobody can use any more: their setups are forgotten."""
+    for monitor in list(_alive):
+        if monitor.is_forgotten():
+            monitor.release()
+
+
 _alive: weakref.WeakSet[PlannerMonitor] = weakref.WeakSet()
+
+
+def _collect(phase: str, info: dict[str, int]) -> None:
+    """Do for cycles through C++ what Python's garbage collector does for others."""
+    if phase == "stop" and info["generation"] == 2:
+        release_forgotten()
+
+
+gc.callbacks.append(_collect)
 
 
 @atexit.register

@@ -21,10 +21,19 @@ from . import compat
 from .attach import Attachment, attach
 from .compat import ou
 from .heatmap_sources import HeatmapSource
-from .hooks import hook_of
+from .hooks import hangs_at_optimum, hook_of
 from .interrupt_guard import InterruptGuard
 from .monitor import CostHistory
-from .problem import Endpoints, checked_path, make_setup, path_length, set_parameter, set_range
+from .problem import (
+    Endpoints,
+    checked_path,
+    make_setup,
+    path_length,
+    search_to_the_end,
+    set_parameter,
+    set_range,
+    stop_at_optimum,
+)
 from .validity import GridMotionValidator, GridValidityChecker
 
 # Collision checks between two looks at the best cost: about six iterations of RRT*, half a
@@ -226,6 +235,7 @@ class BenchmarkSession:
         self.setup.setPlanner(next(iter(self.planners.values())))
         self.records: dict[str, list[RunRecord]] = {variant.name: [] for variant in variants}
         self._grid, self._endpoints, self._options = grid, endpoints, options
+        self._planner_of = {variant.name: variant.planner for variant in variants}
         self._sampler_of = {variant.name: variant.sampler for variant in variants}
         self._sources = {e.sampler: e.source for e in variants if e.source is not None}
         self._heatmaps: dict[str, tuple[Heatmap, float]] = {}
@@ -262,6 +272,11 @@ class BenchmarkSession:
             began = perf_counter()
             self._attachment = attach(self.setup, heatmap, self._sampler_options)
             self._inference_s = made_in + perf_counter() - began
+        # The objective is that of all planners, and the threshold that of one of them.
+        if hangs_at_optimum(self._planner_of[name]):
+            stop_at_optimum(self.setup, self._endpoints, self._options.tolerance)
+        else:
+            search_to_the_end(self.setup)
         self._motions.begin_run(instance)
 
     def after_run(self, planner: Any, _: Any) -> None:
@@ -283,7 +298,7 @@ class BenchmarkSession:
         To be called at the end too, because after an exception there is no post-run event.
         """
         if self._attachment is not None:
-            self._attachment.detach()
+            self._attachment.force_detach()
             self._attachment = None
         return self._motions.end_run()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -11,7 +12,7 @@ from ..sampling.options import SamplerOptions
 from ..sampling.sampler import HeatmapSampler
 from . import compat
 from .compat import ob, typed_state
-from .states import position_bounds, state_access
+from .states import position_bounds, space_of, state_access
 
 
 class HeatmapStateSampler(ob.StateSampler):  # type: ignore[misc]
@@ -26,7 +27,8 @@ class HeatmapStateSampler(ob.StateSampler):  # type: ignore[misc]
     Raises:
         ConfigError: an option that makes no sense, or options beside a :class:`HeatmapSampler`,
             which has its own.
-        PlannerError: the states of the space have no (x, y).
+        HeatmapError: neither a :class:`Heatmap` nor a :class:`HeatmapSampler`.
+        PlannerError: no state space, or its states have no (x, y).
 
     Example:
         >>> from ompl import base as ob
@@ -46,9 +48,9 @@ class HeatmapStateSampler(ob.StateSampler):  # type: ignore[misc]
         options: SamplerOptions | None = None,
         **changes: Any,
     ) -> None:
-        super().__init__(space)
         self._sampler = _heatmap_sampler(heatmap, options, changes)
         self._states = state_access(space, self._sampler.rng)
+        super().__init__(space)
         self._sampler.keep_inside(*position_bounds(space))
 
     @property
@@ -58,15 +60,18 @@ class HeatmapStateSampler(ob.StateSampler):  # type: ignore[misc]
 
     def sampleUniform(self, state: Any) -> None:  # noqa: N802
         """Sample the heat map mixed with uniform: what planners take for "uniform"."""
+        self._sampler.monitor.note_call(sys._getframe(1))
         self._states.write(typed_state(state), *self._sampler.next())
 
     def sampleUniformNear(self, state: Any, near: Any, distance: float) -> None:  # noqa: N802
         """Sample the heat map inside the box of half width ``distance`` around ``near``."""
+        self._sampler.monitor.note_call(sys._getframe(1))
         x, y = self._states.read(typed_state(near))
         self._states.write(typed_state(state), *self._sampler.near(x, y, distance))
 
     def sampleGaussian(self, state: Any, mean: Any, std_dev: float) -> None:  # noqa: N802
         """Sample the product of the heat map and a Gaussian around ``mean``."""
+        self._sampler.monitor.note_call(sys._getframe(1))
         x, y = self._states.read(typed_state(mean))
         self._states.write(typed_state(state), *self._sampler.gaussian(x, y, std_dev))
 
@@ -86,7 +91,8 @@ class HeatmapValidStateSampler(ob.ValidStateSampler):  # type: ignore[misc]
     Raises:
         ConfigError: an option that makes no sense, or options beside a :class:`HeatmapSampler`,
             which has its own.
-        PlannerError: the states of the space have no (x, y).
+        HeatmapError: neither a :class:`Heatmap` nor a :class:`HeatmapSampler`.
+        PlannerError: no space information, or the states of its space have no (x, y).
 
     Example:
         >>> from ompl import base as ob
@@ -108,10 +114,10 @@ class HeatmapValidStateSampler(ob.ValidStateSampler):  # type: ignore[misc]
         options: SamplerOptions | None = None,
         **changes: Any,
     ) -> None:
+        space = space_of(si)
         super().__init__(si)
         self._si = si
         self._sampler = _heatmap_sampler(heatmap, options, changes)
-        space = si.getStateSpace()
         self._states = state_access(space, self._sampler.rng)
         self._sampler.keep_inside(*position_bounds(space))
 
@@ -122,10 +128,12 @@ class HeatmapValidStateSampler(ob.ValidStateSampler):  # type: ignore[misc]
 
     def sample(self, state: Any) -> bool:
         """Sample a valid state; return False when no attempt gave one."""
+        self._sampler.monitor.note_call(sys._getframe(1))
         return self._sample_valid(state, self._sampler.next)
 
     def sampleNear(self, state: Any, near: Any, distance: float) -> bool:  # noqa: N802
         """Sample a valid state in the box of half width ``distance`` around ``near``."""
+        self._sampler.monitor.note_call(sys._getframe(1))
         x, y = self._states.read(typed_state(near))
         return self._sample_valid(state, lambda: self._sampler.near(x, y, distance))
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..common.validation import finite_number, positive_number, whole_number
-from ..errors import ConfigError
+from ..common.validation import finite_number, positive_number, truth_value, whole_number
+from ..errors import ConfigError, MapError, show
 from ..maps.grid_map import GridMap
 from ..sampling.heatmap import Heatmap
 from ..sampling.options import SamplerOptions
@@ -21,10 +21,17 @@ from . import compat
 from .attach import Attachment, attach
 from .compat import ou
 from .heatmap_sources import LEARNED, UNIFORM, HeatmapSource, heatmap_source
-from .hooks import hangs_on_python_termination, hook_of, stops_at_first
+from .hooks import hangs_at_optimum, hangs_on_python_termination, hook_of, stops_at_first
 from .monitor import CostHistory
 from .plan_result import PlanResult
-from .problem import Endpoints, checked_path, make_setup, path_length, set_range
+from .problem import (
+    Endpoints,
+    checked_path,
+    make_setup,
+    path_length,
+    set_range,
+    stop_at_optimum,
+)
 
 if TYPE_CHECKING:
     from ..inference.predictor import Predictor
@@ -94,6 +101,8 @@ def plan(
         >>> result.solved, result.path.shape[1]
         (True, 2)
     """
+    if not isinstance(grid, GridMap | str | PathLike):
+        raise MapError(f"grid is a GridMap or the file of a map, got {show(grid)}")
     source = grid if isinstance(grid, GridMap) else GridMap.load(grid)
     space_map = source.inflated(radius)
     endpoints = space_map.check_task(start, goal)
@@ -117,8 +126,8 @@ def plan(
         make_heatmap=make_heatmap,
         options=options,
         seed=seed,
-        simplify=simplify,
-        keep_tree=keep_tree,
+        simplify=truth_value("simplify", simplify),
+        keep_tree=truth_value("keep_tree", keep_tree),
     )
     with compat.log_level(ou.LOG_ERROR):
         return _run(job)
@@ -207,7 +216,7 @@ def _run(job: _Job) -> PlanResult:
         return _result(job, setup, run, heatmap, attachment, inference_s, simplify_s)
     finally:
         if attachment is not None:
-            attachment.detach()
+            attachment.force_detach()
 
 
 def _set_up(job: _Job) -> Any:
@@ -216,6 +225,8 @@ def _set_up(job: _Job) -> Any:
     if job.range is not None and not set_range(setup.getPlanner(), job.range):
         raise ConfigError(f"{job.planner} has no range to set: leave it out")
     setup.setup()
+    if hangs_at_optimum(job.planner):
+        stop_at_optimum(setup, job.endpoints, job.tolerance)
     return setup
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..errors import ConfigError, show
 from ..maps.grid_map import GridMap
 from . import compat
-from .compat import og
+from .compat import ob, og
 from .validity import GridMotionValidator, GridValidityChecker
 
 #: Start and goal, as from :meth:`GridMap.check_task`.
@@ -22,6 +22,9 @@ _LEAST_THRESHOLD = float(np.finfo(np.float64).eps)
 _NO_PARAMETERS = frozenset(
     {"setName", "setOptimizationObjective", "setProblemDefinition", "settings", "setup"}
 )
+
+# How near to the shortest cost the search for a shorter path ends, relative.
+_OPTIMUM_SLACK = 1e-6
 
 # Slack of the check that a path ends in the goal region, for the rounding of a distance.
 _ROUNDING = 1e-9
@@ -62,6 +65,32 @@ def set_range(planner: Any, range: float) -> bool:
     if has_range:
         planner.setRange(float(range))
     return has_range
+
+
+def stop_at_optimum(setup: Any, endpoints: Endpoints, tolerance: float) -> None:
+    """Let planners of a setup end once no path can be shorter, by a millionth.
+
+    SORRT* needs it. It makes samples that may shorten its path until it has a batch of them, and
+    where the path is the straight line there are none: its solve would never return.
+
+    Args:
+        setup: whose planner has been set up, and has set the objective.
+        endpoints: start and goal.
+        tolerance: how far from the goal a path may end, world units.
+    """
+    shortest = max(float(np.hypot(*(endpoints[1] - endpoints[0]))) - tolerance, 0.0)
+    _set_cost_threshold(setup, shortest * (1 + _OPTIMUM_SLACK))
+
+
+def search_to_the_end(setup: Any) -> None:
+    """Take :func:`stop_at_optimum` back: planners go on to their limits."""
+    _set_cost_threshold(setup, 0.0)
+
+
+def _set_cost_threshold(setup: Any, cost: float) -> None:
+    objective = setup.getProblemDefinition().getOptimizationObjective()
+    if objective is not None:
+        objective.setCostThreshold(ob.Cost(cost))
 
 
 def set_parameter(planner: Any, name: str, value: bool | float | str) -> None:

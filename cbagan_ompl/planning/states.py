@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import PlannerError
+from ..errors import PlannerError, show
 from .compat import ob
 
 
@@ -73,8 +73,10 @@ def state_access(space: Any, seed: int | np.random.Generator | None = None) -> S
         seed: seed or generator for the parts of a state that the heat map says nothing about.
 
     Raises:
-        PlannerError: a space whose states have no (x, y) that a 2-D map could speak about.
+        PlannerError: no state space, or one whose states have no (x, y).
     """
+    if not isinstance(space, ob.StateSpace):
+        raise PlannerError(f"expected a state space of ompl.base, got {show(space)}")
     if isinstance(space, ob.SE2StateSpace):
         return PoseStateAccess(seed)
     if isinstance(space, ob.RealVectorStateSpace) and space.getDimension() == 2:
@@ -83,6 +85,17 @@ def state_access(space: Any, seed: int | np.random.Generator | None = None) -> S
         "a 2-D heat map serves RealVectorStateSpace(2), SE2StateSpace, DubinsStateSpace and "
         f"ReedsSheppStateSpace, not {type(space).__name__} of dimension {space.getDimension()}"
     )
+
+
+def space_of(si: Any) -> Any:
+    """Return the state space of a space information.
+
+    Raises:
+        PlannerError: it is none.
+    """
+    if not isinstance(si, ob.SpaceInformation):
+        raise PlannerError(f"expected a SpaceInformation of ompl.base, got {show(si)}")
+    return si.getStateSpace()
 
 
 def position_bounds(space: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

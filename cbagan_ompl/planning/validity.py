@@ -5,11 +5,11 @@ from __future__ import annotations
 from math import floor
 from typing import Any
 
-from ..errors import PlannerError
+from ..errors import MapError, PlannerError, show
 from ..maps.collision import segment_is_free
 from ..maps.grid_map import GridMap
 from .compat import ob
-from .states import StateAccess, state_access
+from .states import StateAccess, space_of, state_access
 
 _LAST_VALID_PRECISION = 1e-3
 
@@ -22,7 +22,8 @@ class GridValidityChecker(ob.StateValidityChecker):  # type: ignore[misc]
         grid: the map; inflate it first for a robot with a radius.
 
     Raises:
-        PlannerError: the states of the space have no (x, y).
+        MapError: not a :class:`GridMap`.
+        PlannerError: no space information, or the states of its space have no (x, y).
 
     Example:
         >>> from ompl import base as ob
@@ -34,8 +35,9 @@ class GridValidityChecker(ob.StateValidityChecker):  # type: ignore[misc]
     """
 
     def __init__(self, si: Any, grid: GridMap) -> None:
+        _check_grid(grid)
+        self._read = state_access(space_of(si)).read
         super().__init__(si)
-        self._read = state_access(si.getStateSpace()).read
         self._cells, self._width, self._height = grid.cells, grid.width, grid.height
         self._affine = tuple(grid.pixel_from_world)
 
@@ -64,7 +66,9 @@ class GridMotionValidator(ob.MotionValidator):  # type: ignore[misc]
         grid: the map; inflate it first for a robot with a radius.
 
     Raises:
-        PlannerError: the states of the space have no (x, y), or motions are not straight.
+        MapError: not a :class:`GridMap`.
+        PlannerError: no space information, the states of its space have no (x, y), or motions are
+            not straight.
 
     Example:
         >>> from ompl import base as ob
@@ -76,9 +80,10 @@ class GridMotionValidator(ob.MotionValidator):  # type: ignore[misc]
     """
 
     def __init__(self, si: Any, grid: GridMap) -> None:
-        super().__init__(si)
-        self._space = si.getStateSpace()
+        _check_grid(grid)
+        self._space = space_of(si)
         self._read = _straight_state_access(self._space).read
+        super().__init__(si)
         self._cells, self._width, self._height = grid.cells, grid.width, grid.height
         self._affine = tuple(grid.pixel_from_world)
 
@@ -116,6 +121,11 @@ class GridMotionValidator(ob.MotionValidator):  # type: ignore[misc]
         last_valid.second = low
         if last_valid.first is not None:
             self._space.interpolate(s1, s2, low, last_valid.first)
+
+
+def _check_grid(grid: object) -> None:
+    if not isinstance(grid, GridMap):
+        raise MapError(f"expected a GridMap, got {show(grid)}; load one with GridMap.load(path)")
 
 
 def _straight_state_access(space: Any) -> StateAccess:

@@ -5,16 +5,20 @@ from __future__ import annotations
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, SupportsIndex
 
-import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import HeatmapError
+from ..common.validation import random_generator, whole_number
+from ..errors import HeatmapError, show
 from ..maps.connectivity import in_one_component, label_components
+from ..maps.endpoints import check_point
 from ..maps.grid_map import GridMap
 from ..maps.grid_search import pull_taut, shortest_path
+from .bands import half_width, paint_band
+from .heatmap_files import read_heatmap_values
+from .pixels import pixel_pair, sample_in_pixels, sample_pixels
 
 #: A pixel whose value is at least this belongs to the promising region.
 REGION_THRESHOLD = 0.5
@@ -23,7 +27,9 @@ REGION_THRESHOLD = 0.5
 # planner should look, the bridge only connects parts of a region and is kept narrow.
 _CORRIDOR_FRACTION = 0.03
 _BRIDGE_FRACTION = 0.015
-_MIN_HALF_WIDTH = 2.0
+
+# Most points that one call of Heatmap.sample gives: about a gigabyte on the way.
+_MOST_SAMPLES = 10**7
 
 # Longest side of the coarse grid in which bridges are looked for.
 _REPAIR_SIZE = 64
@@ -46,8 +52,8 @@ class Heatmap:
         grid: the map.
 
     Raises:
-        HeatmapError: wrong shape or type, NaN, infinite or negative values, values above 1, or
-            nothing above 0 on free space.
+        HeatmapError: no :class:`GridMap`, wrong shape or type, NaN, infinite or negative values,
+            values above 1, or nothing above 0 on free space.
 
     Example:
         >>> heatmap = Heatmap([[0.2, 0.8], [1.0, 0.0]], GridMap([[1, 1], [1, 0]]))
@@ -58,7 +64,13 @@ class Heatmap:
     """
 
     def __init__(self, values: ArrayLike, grid: GridMap) -> None:
-        raw = np.asarray(values)
+        _check_grid(grid)
+        try:
+            raw = np.asarray(values)
+        except Exception as error:  # rows of different lengths, or whatever the class raises
+            raise HeatmapError(
+                f"a heat map is an array (H, W) of numbers, got {show(values)}"
+            ) from error
         if raw.shape != grid.shape:
             raise HeatmapError(
                 f"a heat map of {grid.name} has shape {grid.shape} (rows, columns), "
@@ -82,7 +94,7 @@ class Heatmap:
         """Read a heat map of a grid: a grey image (black 0, white 1) or a NumPy ``.npy`` array.
 
         Args:
-            path: the file; what does not end in ``.npy`` is read as an image.
+            path: the file; images are PNG, JPEG, BMP, PGM or PPM, recognised by their first bytes.
             grid: the map. Pixels correspond one by one, row 0 on top, whatever its world frame.
 
         Raises:
@@ -97,17 +109,10 @@ class Heatmap:
             ...     Heatmap.load(path, GridMap([[1, 1]])).region.tolist()
             [[False, True]]
         """
-        source = Path(path)
-        try:
-            if source.suffix.lower() == ".npy":
-                return cls(np.load(source, allow_pickle=False), grid)
-            encoded = np.frombuffer(source.read_bytes(), np.uint8)
-        except (OSError, ValueError, EOFError) as error:
-            raise HeatmapError(f"cannot read the heat map {source}: {error}") from error
-        image = cv2.imdecode(encoded, cv2.IMREAD_GRAYSCALE) if encoded.size else None
-        if image is None:
-            raise HeatmapError(f"{source} is neither an image nor a .npy array")
-        return cls(image, grid)
+        _check_grid(grid)
+        if not isinstance(path, str | PathLike):
+            raise HeatmapError(f"the file of a heat map is a path, got {show(path)}")
+        return cls(read_heatmap_values(Path(path), grid.shape), grid)
 
     @classmethod
     def uniform(cls, grid: GridMap) -> Heatmap:
@@ -120,6 +125,7 @@ class Heatmap:
             >>> Heatmap.uniform(GridMap([[1, 0], [1, 1]])).values.tolist()
             [[1.0, 0.0], [1.0, 1.0]]
         """
+        _check_grid(grid)
         return cls(grid.free, grid)
 
     @classmethod
@@ -138,11 +144,10 @@ class Heatmap:
             >>> Heatmap.straight_line(GridMap.load("bundled:rooms"), (20, 20), (230, 20))
             Heatmap('rooms', region 6% of free space)
         """
+        _check_grid(grid)
         endpoints = grid.check_task(start, goal)
         return cls(
-            _paint_band(
-                grid.shape, grid.to_pixel(endpoints), _half_width(grid, _CORRIDOR_FRACTION)
-            ),
+            paint_band(grid.shape, grid.to_pixel(endpoints), half_width(grid, _CORRIDOR_FRACTION)),
             grid,
         )
 
@@ -166,11 +171,12 @@ class Heatmap:
             >>> heatmap.connects((20, 20), (230, 230))
             True
         """
+        _check_grid(grid)
         endpoints = grid.to_pixel(grid.check_task(start, goal))
         pixels = shortest_path(grid.free, *pixel_pair(endpoints))
         assert pixels is not None, "check_task has made sure that a path exists"
         path = np.vstack((endpoints[:1], pull_taut(grid.free, pixels), endpoints[1:]))
-        return cls(_paint_band(grid.shape, path, _half_width(grid, _CORRIDOR_FRACTION)), grid)
+        return cls(paint_band(grid.shape, path, half_width(grid, _CORRIDOR_FRACTION)), grid)
 
     @property
     def region(self) -> NDArray[np.bool_]:
@@ -189,12 +195,15 @@ class Heatmap:
             start: (x, y), world.
             goal: (x, y), world.
 
+        Raises:
+            TaskError: one of them is no point.
+
         Example:
             >>> heatmap = Heatmap([[1.0, 0.2, 1.0]], GridMap([[1, 1, 1]]))
             >>> heatmap.connects((0.5, 0.5), (2.5, 0.5))
             False
         """
-        endpoints = np.array((start, goal), dtype=np.float64)
+        endpoints = np.array((check_point("start", start), check_point("goal", goal)))
         if not self.grid.is_free(endpoints).all():
             return False
         return in_one_component(self.components, *pixel_pair(self.grid.to_pixel(endpoints)))
@@ -226,27 +235,33 @@ class Heatmap:
         cost = np.where(self.region, np.float32(_REGION_COST), 1 + _REGION_COST - self.values)
         pixels = shortest_path(self.grid.free, *pixel_pair(endpoints), cost, _REPAIR_SIZE)
         assert pixels is not None, "check_task has made sure that a path exists"
-        bridge = _paint_band(
-            self.grid.shape, pixels + np.float64(0.5), _half_width(self.grid, _BRIDGE_FRACTION)
+        bridge = paint_band(
+            self.grid.shape, pixels + np.float64(0.5), half_width(self.grid, _BRIDGE_FRACTION)
         )
         return Heatmap(np.maximum(self.values, bridge), self.grid)
 
-    def sample(self, n: int, rng: np.random.Generator | int | None = None) -> NDArray[np.float64]:
+    def sample(
+        self, n: SupportsIndex, rng: np.random.Generator | SupportsIndex | None = None
+    ) -> NDArray[np.float64]:
         """Sample points with a density proportional to the values.
 
         Pixels are sampled exactly, by the inverse of the cumulative sum; inside its pixel a point
         is uniform.
 
         Args:
-            n: how many points.
+            n: how many points, at most ten million.
             rng: a generator, or the seed of a new one.
 
         Returns:
             World points, shape (n, 2).
+
+        Raises:
+            ConfigError: ``n`` is no such number, or ``rng`` neither a generator nor a seed.
         """
-        generator = np.random.default_rng(rng)
+        count = whole_number("n", n, 0, _MOST_SAMPLES)
+        generator = random_generator(rng)
         cumulative = self.values.ravel()[self._support].cumsum(dtype=np.float64)
-        pixels = sample_pixels(self._support, cumulative, n, generator)
+        pixels = sample_pixels(self._support, cumulative, count, generator)
         return sample_in_pixels(self.grid, pixels, generator)
 
     @property
@@ -259,47 +274,25 @@ class Heatmap:
         return f"Heatmap({self.grid.name!r}, region {fraction:.0%} of free space)"
 
 
-def sample_pixels(
-    support: NDArray[np.intp],
-    cumulative: NDArray[np.float64] | None,
-    n: int,
-    rng: np.random.Generator,
-) -> NDArray[np.intp]:
-    """Sample some of the pixels of a heat map.
+def check_heatmap(heatmap: object) -> None:
+    """Raise if a value is no heat map.
 
-    Args:
-        support: flat row-major pixel indices, shape (K,).
-        cumulative: cumulative sum of their weights, shape (K,), the last one above 0; None where
-            all weigh the same.
-        n: how many.
-        rng: the generator.
-
-    Returns:
-        Flat row-major pixel indices, shape (n,).
+    Raises:
+        HeatmapError: it is none; the message says how to make one of an array.
     """
-    if cumulative is None:
-        chosen = rng.integers(len(support), size=n)
-    else:
-        chosen = np.searchsorted(cumulative, rng.random(n) * cumulative[-1], side="right")
-    pixels: NDArray[np.intp] = support[np.minimum(chosen, len(support) - 1)]
-    return pixels
+    if not isinstance(heatmap, Heatmap):
+        raise HeatmapError(
+            f"expected a Heatmap, got {show(heatmap)}; an array of values becomes one with "
+            "Heatmap(values, grid)"
+        )
 
 
-def sample_in_pixels(
-    grid: GridMap, pixels: NDArray[np.intp], rng: np.random.Generator
-) -> NDArray[np.float64]:
-    """Sample a uniform point in each of some pixels.
-
-    Args:
-        grid: the map.
-        pixels: flat row-major indices, shape (n,).
-        rng: the generator.
-
-    Returns:
-        World points, shape (n, 2).
-    """
-    corners = np.stack((pixels % grid.width, pixels // grid.width), axis=-1)
-    return grid.to_world(corners + rng.random((len(pixels), 2)))
+def _check_grid(grid: object) -> None:
+    if not isinstance(grid, GridMap):
+        raise HeatmapError(
+            f"a heat map lies on a GridMap, got {show(grid)}; an array of free pixels becomes one "
+            "with GridMap(free), a map file with GridMap.load(path)"
+        )
 
 
 def _to_unit_range(raw: NDArray[Any]) -> NDArray[np.float32]:
@@ -310,7 +303,8 @@ def _to_unit_range(raw: NDArray[Any]) -> NDArray[np.float32]:
         return raw.astype(np.float32) / np.float32(full)
     if raw.dtype.kind not in "if":
         raise HeatmapError(f"a heat map holds real numbers, not {raw.dtype}")
-    values = raw.astype(np.float32)
+    with np.errstate(over="ignore"):  # what is too large becomes infinite
+        values = raw.astype(np.float32)
     if not np.isfinite(values).all():
         raise HeatmapError(
             f"the heat map holds {int((~np.isfinite(values)).sum())} NaN or infinite values"
@@ -322,25 +316,3 @@ def _to_unit_range(raw: NDArray[Any]) -> NDArray[np.float32]:
             "shift and scale them first"
         )
     return values
-
-
-def pixel_pair(endpoints: NDArray[np.float64]) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Return the pixels (column, row) of two points (u, v), shape (2, 2)."""
-    (u0, v0), (u1, v1) = np.floor(endpoints).astype(int).tolist()
-    return (u0, v0), (u1, v1)
-
-
-def _half_width(grid: GridMap, fraction: float) -> float:
-    return max(_MIN_HALF_WIDTH, fraction * max(grid.shape))
-
-
-def _paint_band(
-    shape: tuple[int, int], path: NDArray[np.float64], half_width: float
-) -> NDArray[np.float32]:
-    """Paint a polyline of pixel points (M, 2): 1 on it, 0.5 at ``half_width`` pixels from it."""
-    off_path = np.ones(shape, np.uint8)
-    corners = np.floor(path).astype(np.int32).reshape(-1, 1, 2)
-    cv2.polylines(off_path, [corners], isClosed=False, color=0)
-    distance = cv2.distanceTransform(off_path, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    band: NDArray[np.float32] = np.exp2(-((distance / np.float32(half_width)) ** 2))
-    return np.where(band < 0.01, np.float32(0), band)

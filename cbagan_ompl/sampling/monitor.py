@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import inf
+from types import FrameType
 from typing import Protocol
 
 from .heatmap import Heatmap
@@ -11,6 +12,9 @@ from .informed_set import InformedSet
 
 class Monitor(Protocol):
     """A view of a planner at work."""
+
+    def note_call(self, caller: FrameType) -> None:
+        """Note which frame has called the planner, which asks for a sample."""
 
     def best_cost(self) -> float:
         """Return the cost of the best solution, infinite before there is one."""
@@ -30,6 +34,9 @@ class Monitor(Protocol):
 
 class NoMonitor:
     """The monitor of a sampler that feeds no planner, or one that cannot be observed."""
+
+    def note_call(self, caller: FrameType) -> None:
+        """Do nothing: there is no planner."""
 
     def best_cost(self) -> float:
         """Return infinity: no solution is ever seen."""

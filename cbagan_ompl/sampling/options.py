@@ -4,12 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
-from math import isfinite
-from typing import Any, SupportsFloat
+from typing import Any
 
 import numpy as np
 
-from ..errors import ConfigError
+from ..common.validation import check_seed, is_finite_number, random_generator, truth_value
+from ..errors import ConfigError, show
+
+#: Least uniform fraction: with less, no run would ever see a uniform sample.
+LEAST_UNIFORM_FRACTION = 1e-6
+
+#: Largest sharpness: beyond it only the largest values of the heat map would count, as with it.
+LARGEST_SHARPNESS = 1e6
 
 #: Fraction of the samples that stays uniform over free space unless the user asks otherwise.
 DEFAULT_UNIFORM_FRACTION = 0.1
@@ -37,6 +43,10 @@ class Adaptation:
     coverage: bool = True
     stagnation: bool = True
 
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            truth_value(field.name, getattr(self, field.name))
+
     @classmethod
     def of(cls, names: Iterable[str]) -> Adaptation:
         """Return the adaptation with some of its rules on and the others off.
@@ -45,13 +55,18 @@ class Adaptation:
             names: of the rules, see :data:`ADAPTATION_RULES`; none switches all of them off.
 
         Raises:
-            ConfigError: an unknown name.
+            ConfigError: an unknown name, or one text in place of several names.
         """
-        chosen = set(names)
-        unknown = sorted(chosen - set(ADAPTATION_RULES))
+        if isinstance(names, str) or not isinstance(names, Iterable):
+            raise ConfigError(
+                f"the rules of an adaptation are a list of names, such as ['coverage'], got "
+                f"{show(names)}"
+            )
+        chosen = list(names)
+        unknown = [n for n in chosen if not (isinstance(n, str) and n in ADAPTATION_RULES)]
         if unknown:
             raise ConfigError(
-                f"unknown adaptation {', '.join(unknown)!r}; there are "
+                f"unknown adaptation {', '.join(map(show, unknown))}; there are "
                 f"{', '.join(ADAPTATION_RULES)}"
             )
         return cls(**{name: name in chosen for name in ADAPTATION_RULES})
@@ -75,10 +90,12 @@ class SamplerOptions:
     """How samples follow a heat map.
 
     Attributes:
-        uniform_fraction: fraction of the samples that stays uniform over free space, in (0, 1]. It
-            is never 0, so that the planner stays probabilistically complete.
+        uniform_fraction: fraction of the samples that stays uniform over free space, from
+            :data:`LEAST_UNIFORM_FRACTION` to 1. It is never 0, so that the planner stays
+            probabilistically complete.
         sharpness: exponent of the heat map: the density of the learned samples is proportional to
-            ``values ** sharpness``. With None the planner decides, see :func:`cbagan_ompl.attach`.
+            ``values ** sharpness``. It is above 0 and at most :data:`LARGEST_SHARPNESS`. With None
+            the planner decides, see :func:`cbagan_ompl.attach`.
         adaptation: how the mixture follows the planner's tree, see :class:`Adaptation`.
         seed: an int of at least 0, or a generator; the same seed gives the same samples.
 
@@ -96,25 +113,29 @@ class SamplerOptions:
     seed: int | np.random.Generator | None = None
 
     def __post_init__(self) -> None:
-        if not (
-            isinstance(self.uniform_fraction, SupportsFloat) and 0 < self.uniform_fraction <= 1
+        fraction, sharpness = self.uniform_fraction, self.sharpness
+        if not (is_finite_number(fraction) and LEAST_UNIFORM_FRACTION <= fraction <= 1):
+            raise ConfigError(
+                f"uniform_fraction is a fraction from {LEAST_UNIFORM_FRACTION:g} to 1, got "
+                f"{show(fraction)}; it cannot be 0, because the planner would lose probabilistic "
+                "completeness"
+            )
+        if sharpness is not None and not (
+            is_finite_number(sharpness) and 0 < sharpness <= LARGEST_SHARPNESS
         ):
             raise ConfigError(
-                "uniform_fraction is a fraction above 0 and up to 1, got "
-                f"{self.uniform_fraction!r}; it cannot be 0, because the planner would lose "
-                "probabilistic completeness"
+                f"sharpness is a finite number above 0, got {show(sharpness)}; at most "
+                f"{LARGEST_SHARPNESS:g}, or None where the planner is to decide"
             )
-        if self.sharpness is not None and not (
-            isinstance(self.sharpness, SupportsFloat)
-            and isfinite(self.sharpness)
-            and self.sharpness > 0
-        ):
-            raise ConfigError(f"sharpness is a finite number above 0, got {self.sharpness!r}")
         if not isinstance(self.adaptation, Adaptation):
             raise ConfigError(
-                f"adaptation is an Adaptation, such as Adaptation.of(['coverage']), got "
-                f"{self.adaptation!r}"
+                f"adaptation is an Adaptation, got {show(self.adaptation)}; write "
+                "Adaptation.of([]) for none, Adaptation.of(['coverage']) for single rules"
             )
+        # Any kind of real number is a float from here on, and any whole number an int.
+        object.__setattr__(self, "uniform_fraction", float(fraction))
+        object.__setattr__(self, "sharpness", None if sharpness is None else float(sharpness))
+        object.__setattr__(self, "seed", check_seed(self.seed))
 
     @classmethod
     def of(cls, options: SamplerOptions | None, changes: Mapping[str, Any]) -> SamplerOptions:
@@ -128,13 +149,15 @@ class SamplerOptions:
             ConfigError: an unknown option, or a value that makes no sense.
         """
         if not isinstance(options, cls | None):
-            raise ConfigError(f"options are SamplerOptions(...), got {options!r}")
+            raise ConfigError(f"options are SamplerOptions(...), got {show(options)}")
         known = [field.name for field in fields(cls)]
         for name in changes:
             if name not in known:
-                raise ConfigError(f"unknown sampler option {name!r}; known are {', '.join(known)}")
+                raise ConfigError(
+                    f"unknown sampler option {show(name)}; known are {', '.join(known)}"
+                )
         return replace(options or cls(), **changes)
 
     def generator(self) -> np.random.Generator:
         """Return the generator of the seed: a new one for an int, itself for a generator."""
-        return np.random.default_rng(self.seed)
+        return random_generator(self.seed)

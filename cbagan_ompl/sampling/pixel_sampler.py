@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from ..errors import HeatmapError
 from ..maps.grid_map import GridMap
-from .heatmap import sample_in_pixels, sample_pixels
 from .informed_set import InformedSet
+from .pixels import sample_in_pixels, sample_pixels
 
 # The first batch is small, because small tasks need few samples; each is twice the one before.
 _FIRST_BATCH, _LARGEST_BATCH = 128, 1024

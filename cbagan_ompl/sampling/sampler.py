@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .adaptation import AdaptiveMixture
-from .heatmap import Heatmap
+from .heatmap import Heatmap, check_heatmap
 from .monitor import Monitor, NoMonitor
 from .options import SamplerOptions
 from .pixel_sampler import PixelSampler
@@ -30,6 +30,7 @@ class HeatmapSampler:
         heatmap: what is sampled.
         rng: the generator of the samples, and of whatever else belongs to the same run.
         chance: returns a random number of ``rng`` in [0, 1) at each call.
+        monitor: of the planner that is fed.
 
     Args:
         heatmap: what to sample.
@@ -40,6 +41,7 @@ class HeatmapSampler:
 
     Raises:
         ConfigError: an option that makes no sense, see :class:`.options.SamplerOptions`.
+        HeatmapError: not a :class:`.heatmap.Heatmap`.
 
     Example:
         >>> from cbagan_ompl import GridMap, Heatmap
@@ -58,13 +60,14 @@ class HeatmapSampler:
         **changes: Any,
     ) -> None:
         options = SamplerOptions.of(options, changes)
+        check_heatmap(heatmap)
         self.heatmap = heatmap
         self.rng = options.generator()
         # A generator of single numbers, which NumPy's is slow at.
         self.chance = Random(int(self.rng.integers(2**63))).random
         self._uniform_fraction = float(options.uniform_fraction)
         self._exponent = np.float32(1.0 if options.sharpness is None else options.sharpness)
-        self._monitor = monitor or NoMonitor()
+        self.monitor = monitor or NoMonitor()
         self._mixture = mixture
         self._learned_count = self._uniform_count = 0
         self._best = inf
@@ -107,7 +110,7 @@ class HeatmapSampler:
         """Note that the planner has begun to plan; only the first call counts."""
         if self._mixture is not None and not self._has_begun:
             self._has_begun = True
-            self._mixture.on_start(self._monitor.connects(self.heatmap))
+            self._mixture.on_start(self.monitor.connects(self.heatmap))
 
     def on_new_node(self, x: float, y: float, in_goal: bool) -> None:
         """Note that the planner's tree has a new node.
@@ -122,7 +125,7 @@ class HeatmapSampler:
 
     def next(self) -> tuple[float, float]:
         """Return the next sample, (x, y), world."""
-        best = self._monitor.best_cost()
+        best = self.monitor.best_cost()
         if best != self._best:
             self._update_best(best)
         if self.chance() >= self._uniform_fraction:
@@ -170,7 +173,7 @@ class HeatmapSampler:
 
     def _update_best(self, best: float) -> None:
         if (best < inf) != (self._best < inf):
-            informed = self._monitor.informed_set() if best < inf else None
+            informed = self.monitor.informed_set() if best < inf else None
             self._learned.set_informed(informed)
             self._uniform.set_informed(informed)
         if self._mixture is not None:

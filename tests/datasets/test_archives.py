@@ -6,6 +6,7 @@ import bz2
 import gzip
 import io
 import lzma
+import os
 import struct
 import subprocess
 import sys
@@ -320,8 +321,8 @@ resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
 sys.exit(main(["dataset", "import", sys.argv[1]]))
 """
     done = subprocess.run(
-        [sys.executable, "-c", script, str(tmp_path / "a.tar")],
-        capture_output=True, text=True, timeout=60, env={"TMPDIR": str(tmp_path)},
+        [sys.executable, "-B", "-c", script, str(tmp_path / "a.tar")],
+        capture_output=True, text=True, timeout=60, env={**os.environ, "TMPDIR": str(tmp_path)},
     )  # fmt: skip
     assert done.returncode == 2, done
     assert done.stderr.endswith("a.tar: File too large\n"), done

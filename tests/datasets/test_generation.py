@@ -10,6 +10,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from helpers.fuzzing import mutations, read_all
 from helpers.training_set import SMALL, assert_same_files
 
 from cbagan_ompl import ConfigError, DatasetError
@@ -136,6 +137,18 @@ def test_damaged_records(tmp_path: Path, text: str) -> None:
         generate(tmp_path, SMALL, jobs=1, resume=True)
 
 
+def test_fuzzed_records(tmp_path: Path) -> None:
+    generate(tmp_path, replace(SMALL, maps=2, tasks=1, split="task"), 1, False, progress=False)
+    path = tmp_path / RECORD
+
+    def resume(data: bytes) -> None:
+        path.write_bytes(data)
+        generate(tmp_path, SMALL, jobs=1, resume=True, progress=False)
+
+    counts = read_all(resume, mutations([path.read_bytes()], 300, seed=0))
+    assert counts == {"refused": 300}
+
+
 def test_a_full_disk_leaves_no_half_files(tmp_path: Path) -> None:
     script = """
 import resource, sys
@@ -152,7 +165,7 @@ if __name__ == "__main__":
 """
     (tmp_path / "script.py").write_text(script)
     done = subprocess.run(
-        [sys.executable, str(tmp_path / "script.py"), str(tmp_path / "set")],
+        [sys.executable, "-B", str(tmp_path / "script.py"), str(tmp_path / "set")],
         capture_output=True, text=True, timeout=120,
     )  # fmt: skip
     assert re.match(r"cannot write .*/map_\d\.csv: File too large", done.stdout), done

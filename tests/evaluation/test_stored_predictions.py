@@ -1,10 +1,13 @@
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from helpers.fuzzing import mutations, read_all
+from helpers.images import png_file
 from helpers.predictions import store
 
 from cbagan_ompl import DatasetError
@@ -32,4 +35,29 @@ def test_faults_in_stored_predictions(folder: Path, dataset: Dataset, tmp_path: 
         load_predictions(tmp_path, folder, "test")
     (tmp_path / "results.csv").write_text("true_roi,pred_roi\n")
     with pytest.raises(DatasetError, match="no prediction for map_0/"):
+        load_predictions(tmp_path, folder, "test")
+
+
+def test_damaged_lists_of_predictions_are_read_or_refused(
+    folder: Path, dataset: Dataset, tmp_path: Path
+) -> None:
+    store(tmp_path, folder, dataset.test.region, listed=True)
+    path = tmp_path / "results.csv"
+
+    def load(data: bytes) -> None:
+        path.write_bytes(data)
+        load_predictions(tmp_path, folder, "test")
+
+    counts = read_all(load, mutations([path.read_bytes()], 300, seed=0))
+    assert min(counts["read"], counts["refused"]) > 5
+
+
+def test_predictions_that_are_too_large(folder: Path, dataset: Dataset, tmp_path: Path) -> None:
+    store(tmp_path, folder, dataset.test.region, listed=True)
+    (tmp_path / "roi_0.png").write_bytes(png_file((32000, 32000), b"", depth=1))
+    with pytest.raises(DatasetError, match="32000 x 32000 pixels"):
+        load_predictions(tmp_path, folder, "test")
+    (tmp_path / "roi_0.png").unlink()
+    os.mkfifo(tmp_path / "roi_0.png")
+    with pytest.raises(DatasetError, match="a device or a pipe"):
         load_predictions(tmp_path, folder, "test")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import inf
+from types import FrameType
 
 from cbagan_ompl.sampling.heatmap import Heatmap
 from cbagan_ompl.sampling.informed_set import InformedSet
@@ -22,6 +23,9 @@ class FakeMonitor:
         self.best_cost = best_cost
         self.fractions = [1.0]
         self._informed, self._nodes, self._connected = informed, nodes, connected
+
+    def note_call(self, caller: FrameType) -> None:
+        pass
 
     def informed_set(self) -> InformedSet | None:
         return self._informed

@@ -58,7 +58,7 @@ def test_samples_follow_a_power_of_the_heat_map(sharpness: float, dim_fraction: 
     values = np.full(grid.shape, 4e-10)
     values[:, :20] = 1e-10
     sampler = HeatmapSampler(
-        Heatmap(values, grid), uniform_fraction=1e-9, seed=0, sharpness=sharpness
+        Heatmap(values, grid), uniform_fraction=1e-6, seed=0, sharpness=sharpness
     )
     assert abs((take(sampler, 20_000)[:, 0] < 20).mean() - dim_fraction) < 0.01
     near = np.array([sampler.near(20, 20, 10) for _ in range(3000)])
