@@ -20,7 +20,8 @@ BELOW = {
     "map_generators": {"errors", "common"},
     "maps": {"errors", "common"},
     "sampling": {"errors", "common", "maps"},
-    "inference": {"errors", "common", "maps", "sampling"},
+    # The limits of a model are those of the networks' configuration, which loads no torch.
+    "inference": {"errors", "common", "maps", "sampling", "networks"},
     "planning": {"errors", "common", "maps", "sampling", "inference"},
     "benchmarking": {"errors", "common", "maps", "sampling", "inference", "planning"},
     "datasets": {

@@ -76,19 +76,6 @@ def execute(args: argparse.Namespace) -> int:
         return status
 
 
-<<<<<<< HEAD
-def load_commands() -> None:
-    """Import what the commands need, which takes a second: not done with this module.
-
-    So the command line can handle Ctrl-C and SIGTERM before.
-    """
-    # Damaged images are errors of ours, and need no other line.
-    os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
-    from . import benchmark, dataset, evaluate, plan, train  # noqa: F401
-
-
-=======
->>>>>>> main
 def _explain(error: Exception) -> tuple[int, str]:
     """Return the exit status of an error, and what to say of it."""
     if isinstance(error, CbaganOmplError):
@@ -134,6 +121,8 @@ def _bind_points(arguments: Sequence[str]) -> list[str]:
 
 
 def _make_parser() -> argparse.ArgumentParser:
+    # Damaged images are errors of ours, and need no other line.
+    os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
     # Here, because they load much: until then Ctrl-C has to end the process without a word more.
     from .benchmark import add_benchmark_parser
     from .dataset import add_dataset_parser

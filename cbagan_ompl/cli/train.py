@@ -98,15 +98,18 @@ def add_train_parser(subparsers: Any) -> None:
         f"{', '.join(TrainingConfig().to_dict())}",
     )
     recipe.add_argument("--epochs", type=int, metavar="N", help="the same as --set epochs=N")
-    machine = parser.add_argument_group("machine")
-    machine.add_argument(
-        "--device", default="auto", help="cpu, cuda, ... (default: a GPU if there is one)"
-    )
-    machine.add_argument("--threads", type=int, metavar="N", help="CPU threads (default: all)")
+    _add_machine_options(parser.add_argument_group("machine"))
     parser.add_argument(
         "--tensorboard", action="store_true", help="write logs for TensorBoard into the folder"
     )
     parser.add_argument("--json", metavar="FILE", help="write the scores as JSON")
+
+
+def _add_machine_options(group: Any) -> None:
+    group.add_argument(
+        "--device", default="auto", help="cpu, cuda, ... (default: a GPU if there is one)"
+    )
+    group.add_argument("--threads", type=int, metavar="N", help="CPU threads (default: all)")
 
 
 def _add_synthetic_options(group: Any) -> None:

@@ -32,7 +32,7 @@ def test_options_are_values() -> None:
         options.seed = 2  # type: ignore[misc]
 
 
-@pytest.mark.parametrize("value", [1e-9, 0.1, 1, 1.0, np.float32(0.5)])
+@pytest.mark.parametrize("value", [1e-6, 0.1, 1, 1.0, np.float32(0.5)])
 def test_uniform_fractions(value: float) -> None:
     assert SamplerOptions(uniform_fraction=value).uniform_fraction == value
 
