@@ -17,7 +17,7 @@ def one_line(text: str, longest: int = 200) -> str:
 
     Example:
         >>> one_line("maze\n2"), one_line("x" * 300, 20)
-        ('maze\\n2', 'xxxxxxxxx...ef9f7e3f')
+        ('maze\\n2', 'xxxxxxxxx...1b432d13')
     """
     line = text
     if not text.isprintable():
