@@ -49,9 +49,9 @@ def load_model(path: str | PathLike[str] | None = None) -> Predictor:
         >>> load_model()
         Predictor('cbagan-worlds', working size 256 pixels)
     """
-    require_torch()
     source = bundled_model() if path is None else as_path(path, ModelError)
-    model = read_model(source)
+    model = read_model(source)  # before torch is loaded, which takes seconds
+    require_torch()
     if not model.is_listed:
         try_model(str(source), model.script, Kind.REGION, model.record["working_size"])
     try:
