@@ -85,8 +85,10 @@ def select_tasks(
         whole_number("tasks per map", tasks_per_map, 1, MAX_TASKS)
     selected = []
     for path in maps or [BUNDLED + name for name in bundled_maps()]:
-        grid = GridMap.load(path, **(map_options or {})).inflated(radius)
-        given = tasks_of(path, grid) if tasks is None else load_tasks(tasks, grid)
+        loaded = GridMap.load(path, **(map_options or {}))
+        # By the name of the file: that of an inflated map says so.
+        given = tasks_of(path, loaded) if tasks is None else load_tasks(tasks, loaded)
+        grid = loaded.inflated(radius)
         if not given:
             given = random_tasks(grid, tasks_per_map or _RANDOM_TASKS, seed)
         for number in _spread(len(given), tasks_per_map):

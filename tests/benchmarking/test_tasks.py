@@ -59,3 +59,9 @@ def test_tasks_are_checked(image: str, tmp_path: Path) -> None:
 def test_names_have_no_blanks() -> None:
     grid = GridMap(np.ones((9, 9), bool), name="my map/1")
     assert BenchmarkTask(grid, 2, Task((0, 0), (1, 1))).name == "my_map_1_2"
+
+
+def test_tasks_are_found_for_inflated_maps() -> None:
+    tasks = select_tasks(["bundled:maze"], radius=1.0)
+    assert [task.task for task in tasks] == [task.task for task in select_tasks(["bundled:maze"])]
+    assert {task.grid.name for task in tasks} == {"maze (inflated by 1)"}
