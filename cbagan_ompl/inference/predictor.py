@@ -5,7 +5,6 @@ from __future__ import annotations
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -17,17 +16,18 @@ from ..networks.config import MAX_IMAGE_SIZE
 from ..sampling.heatmap import Heatmap
 from .model_files import bundled_model, load_script, read_model
 from .probe import Kind, try_model
+from .scaling import enlarged_values, scaled_map, scaled_shape
+from .torch_state import own_torch_state
 
 if TYPE_CHECKING:
     import torch
 
-# Free space keeps at least this value, so that a heat map can be sampled even where the network is
-# certain that no path runs.
-_FLOOR = 1e-4
+# Values below this become 0: a region of a few per cent of a large map then costs a few per cent of
+# its pixels. Samples outside come from the uniform fraction.
+_LEAST_VALUE = 1e-3
 
-# Small maps are enlarged by this factor at most: more shows the network nothing new, and the cost
-# grows with its square.
-_MAX_ENLARGEMENT = 2
+# Of free space where the network paints nothing at all, so that the heat map can be sampled.
+_FLOOR = 1e-4
 
 
 def load_model(path: str | PathLike[str] | None = None) -> Predictor:
@@ -142,9 +142,11 @@ class Predictor:
         endpoints = grid.to_pixel(grid.check_task(start, goal))
         shape = scaled_shape(grid.shape, int(self.record["working_size"]))
         scaled = endpoints * (shape[1] / grid.width, shape[0] / grid.height)
-        values = self.probabilities(scaled_free(grid.free, shape)[None], *scaled[:, None])[0]
-        full = cv2.resize(values, grid.shape[::-1], interpolation=cv2.INTER_LINEAR)
-        heatmap = Heatmap(np.clip(full, _FLOOR, 1), grid)
+        values = self.probabilities(scaled_map(grid, shape)[None], *scaled[:, None])[0]
+        full = enlarged_values(values, grid.shape, _LEAST_VALUE)
+        if not full[grid.free].any():
+            full[:] = _FLOOR
+        heatmap = Heatmap(full, grid)
         return heatmap.connected(start, goal) if repair else heatmap
 
     def probabilities(
@@ -161,19 +163,12 @@ class Predictor:
             (B, H, W), the probability that a pixel belongs to the region.
         """
         import torch
-        from torch.jit import optimized_execution  # type: ignore[attr-defined]
 
         cells = torch.from_numpy(free.astype(np.float32))[:, None]
         endpoints = (torch.from_numpy(points.astype(np.float32)) for points in (start, goal))
-        threads = torch.get_num_threads()
-        torch.set_num_threads(self.inference_threads)
-        try:
-            # Without the optimiser, whose first two calls take ten times as long: a plan makes one.
-            with torch.inference_mode(), optimized_execution(False):
-                values = self._module(cells, *endpoints)
-        finally:
-            torch.set_num_threads(threads)
-        result: NDArray[np.float32] = values[:, 0].numpy()
+        with own_torch_state(self.inference_threads):
+            values = self._module(cells, *endpoints)
+            result: NDArray[np.float32] = values[:, 0].numpy()
         return result
 
     def __repr__(self) -> str:
@@ -181,33 +176,3 @@ class Predictor:
             f"Predictor({self.record.get('name')!r}, "
             f"working size {self.record['working_size']} pixels)"
         )
-
-
-def scaled_shape(shape: tuple[int, int], longest: int) -> tuple[int, int]:
-    """Return rows and columns of a map scaled to ``longest`` pixels on its longer side.
-
-    Small maps are doubled at most.
-
-    Example:
-        >>> scaled_shape((512, 256), 256), scaled_shape((30, 20), 256)
-        ((256, 128), (60, 40))
-    """
-    factor = min(longest / max(shape), _MAX_ENLARGEMENT)
-    return max(1, round(factor * shape[0])), max(1, round(factor * shape[1]))
-
-
-def scaled_free(free: NDArray[np.bool_], shape: tuple[int, int]) -> NDArray[np.bool_]:
-    """Return a free mask at another size; a pixel is free when any pixel of its block is.
-
-    When a map is scaled down, narrow passages survive, thin walls may not. That is the lesser harm:
-    where the predicted region then crosses a wall, the obstacles of the full map cut it, but
-    through a passage that the network cannot see it predicts no region.
-
-    Args:
-        free: (H, W), true where free.
-        shape: (h, w).
-    """
-    if shape == free.shape:
-        return free
-    rows, columns = (np.arange(n) * size // n for n, size in zip(shape, free.shape, strict=True))
-    return np.logical_or.reduceat(np.logical_or.reduceat(free, rows, axis=0), columns, axis=1)
