@@ -22,9 +22,10 @@ from .torch_state import own_torch_state
 if TYPE_CHECKING:
     import torch
 
-# Values below this become 0: a region of a few per cent of a large map then costs a few per cent of
-# its pixels. Samples outside come from the uniform fraction.
-_LEAST_VALUE = 1e-3
+# Values below this become 0: by the labels that networks are trained on, paths through such pixels
+# are a quarter longer than the best. What a network paints far from any path is a thousandth or so;
+# on large maps that would add up to most of the samples, and cost time in every pixel.
+_LEAST_VALUE = 2.0**-5
 
 # Of free space where the network paints nothing at all, so that the heat map can be sampled.
 _FLOOR = 1e-4
