@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..common.files import as_path
 from ..common.validation import require_torch, truth_value, whole_number
-from ..errors import MapError, ModelError, show
+from ..errors import MapError, ModelError, TaskError, show
 from ..maps.grid_map import GridMap
 from ..networks.config import MAX_IMAGE_SIZE
 from ..sampling.heatmap import Heatmap
@@ -29,6 +30,9 @@ _LEAST_VALUE = 2.0**-5
 
 # Of free space where the network paints nothing at all, so that the heat map can be sampled.
 _FLOOR = 1e-4
+
+# Tasks in one pass of the network: more are no quicker, and take memory.
+_BATCH = 8
 
 
 def load_model(path: str | PathLike[str] | None = None) -> Predictor:
@@ -134,21 +138,69 @@ class Predictor:
             TaskError: see :meth:`GridMap.check_task`.
             ConfigError: ``repair`` is no truth value.
         """
+        return self._predict(grid, [start], [goal], repair)[0]
+
+    def predict_many(
+        self,
+        grid: GridMap,
+        starts: Iterable[ArrayLike],
+        goals: Iterable[ArrayLike],
+        repair: bool = True,
+    ) -> list[Heatmap]:
+        """Predict for several tasks on one map, in passes of several tasks each.
+
+        Args:
+            grid: the map.
+            starts: (x, y) of each task, world.
+            goals: (x, y) of each task, world.
+            repair: see :meth:`predict`.
+
+        Returns:
+            The heat map of each task.
+
+        Raises:
+            MapError: ``grid`` is no :class:`GridMap`.
+            TaskError: starts and goals are not as many, or see :meth:`GridMap.check_task`.
+            ConfigError: ``repair`` is no truth value.
+
+        Example:
+            >>> from cbagan_ompl import GridMap
+            >>> grid = GridMap.load("bundled:rooms")
+            >>> goals = [(230, 230), (230, 20)]
+            >>> len(load_model().predict_many(grid, [(20, 20)] * 2, goals))
+            2
+        """
+        starts, goals = _list_points("starts", starts), _list_points("goals", goals)
+        if len(starts) != len(goals):
+            raise TaskError(f"each task has a start and a goal, got {len(starts)} and {len(goals)}")
+        return [
+            heatmap
+            for i in range(0, len(starts), _BATCH)
+            for heatmap in self._predict(
+                grid, starts[i : i + _BATCH], goals[i : i + _BATCH], repair
+            )
+        ]
+
+    def _predict(
+        self, grid: GridMap, starts: list[ArrayLike], goals: list[ArrayLike], repair: bool
+    ) -> list[Heatmap]:
+        """Predict for tasks on one map, in one pass of the network."""
         if not isinstance(grid, GridMap):
             raise MapError(
                 f"predict takes a GridMap, got {show(grid)}; make one of an array, true where "
                 "free, with GridMap(array)"
             )
         repair = truth_value("repair", repair)
-        endpoints = grid.to_pixel(grid.check_task(start, goal))
+        tasks = [grid.check_task(*task) for task in zip(starts, goals, strict=True)]
         shape = scaled_shape(grid.shape, int(self.record["working_size"]))
-        scaled = endpoints * (shape[1] / grid.width, shape[0] / grid.height)
-        values = self.probabilities(scaled_map(grid, shape)[None], *scaled[:, None])[0]
-        full = enlarged_values(values, grid.shape, _LEAST_VALUE)
-        if not full[grid.free].any():
-            full[:] = _FLOOR
-        heatmap = Heatmap(full, grid)
-        return heatmap.connected(start, goal) if repair else heatmap
+        scale = shape[1] / grid.width, shape[0] / grid.height
+        endpoints = grid.to_pixel(np.array(tasks)) * scale
+        free = np.broadcast_to(scaled_map(grid, shape), (len(tasks), *shape))
+        outputs = self.probabilities(free, endpoints[:, 0], endpoints[:, 1])
+        heatmaps = [_make_heatmap(values, grid) for values in outputs]
+        if not repair:
+            return heatmaps
+        return [heatmap.connected(*task) for heatmap, task in zip(heatmaps, tasks, strict=True)]
 
     def probabilities(
         self, free: NDArray[np.bool_], start: NDArray[np.floating], goal: NDArray[np.floating]
@@ -177,3 +229,19 @@ class Predictor:
             f"Predictor({self.record.get('name')!r}, "
             f"working size {self.record['working_size']} pixels)"
         )
+
+
+def _list_points(name: str, points: Iterable[ArrayLike]) -> list[ArrayLike]:
+    """Return the endpoints of several tasks as a list."""
+    try:
+        return list(points)
+    except Exception as error:  # a number, or whatever the class raises
+        raise TaskError(f"{name} is a list of points (x, y), got {show(points)}") from error
+
+
+def _make_heatmap(values: NDArray[np.float32], grid: GridMap) -> Heatmap:
+    """Return the heat map of a network's output."""
+    full = enlarged_values(values, grid.shape, _LEAST_VALUE)
+    if not np.logical_and(full > 0, grid.free).any():
+        full[:] = _FLOOR
+    return Heatmap(full, grid)

@@ -98,6 +98,35 @@ def test_a_heat_map_without_region_can_be_sampled() -> None:
     assert not heatmap.region.any()
 
 
+def test_many_tasks_have_the_heat_maps_of_each(predictor: Predictor) -> None:
+    free = np.ones((40, 64), bool)
+    free[:30, 30] = False
+    grid = GridMap(free)
+    rng = np.random.default_rng(0)
+    starts, goals = rng.uniform((0, 0), (30, 40), (19, 2)), rng.uniform((31, 0), (64, 40), (19, 2))
+    together = predictor.predict_many(grid, starts, goals)
+    for heatmap, start, goal in zip(together, starts, goals, strict=True):
+        alone = predictor.predict(grid, start, goal)
+        np.testing.assert_allclose(heatmap.values, alone.values, atol=1e-4)
+    assert predictor.predict_many(grid, [], []) == []
+
+
+@pytest.mark.parametrize(
+    ("starts", "goals", "message"),
+    [
+        ([(1, 1)], [], "1 and 0"),
+        (3, [(1, 1)], "starts is a list of points"),
+        ([(1, 1)], [(50, 50)], "outside"),
+        ([(1, 1, 1)], [(5, 5)], "two finite numbers"),
+    ],
+)
+def test_tasks_that_cannot_be_predicted(
+    predictor: Predictor, starts: object, goals: object, message: str
+) -> None:
+    with pytest.raises(TaskError, match=message):
+        predictor.predict_many(GridMap(np.ones((20, 20))), starts, goals)  # type: ignore[arg-type]
+
+
 def test_tasks_outside_the_map(predictor: Predictor) -> None:
     with pytest.raises(TaskError):
         predictor.predict(GridMap(np.ones((20, 20))), (1, 1), (50, 50))
