@@ -30,6 +30,8 @@ class PlanResult:
         goal: (x, y), world.
         goal_tolerance: how far from the goal a path may end, world units.
         path: way points from start to goal, (N, 2), world; empty when not solved.
+        trajectory: the path followed at steps of at most half a pixel, its way points included,
+            (M, 2), world; empty when not solved.
         cost: length of the path; infinite when not solved.
         inference_s: making the heat map and attaching it, loading the model not included.
         planning_s: inside the planner's ``solve``.
@@ -42,6 +44,8 @@ class PlanResult:
         iterations: evaluations of the termination condition, about one per iteration; None for
             planners that take no Python termination condition.
         nodes: states in the planner's tree or roadmap.
+        nodes_at_first_solution: the same when the first solution was found; None when not solved or
+            the planner does not let it be known.
         sample_counts: ``{"learned": n, "uniform": m}`` samples that the planner had from the heat
             map's hook; both 0 for the uniform sampler, which has no hook.
         heatmap: what was sampled; None for the uniform sampler. Not part of the JSON.
@@ -69,6 +73,7 @@ class PlanResult:
     goal: NDArray[np.float64]
     goal_tolerance: float
     path: NDArray[np.float64]
+    trajectory: NDArray[np.float64]
     cost: float
     inference_s: float
     planning_s: float
@@ -78,6 +83,7 @@ class PlanResult:
     progress: NDArray[np.float64]
     iterations: int | None
     nodes: int
+    nodes_at_first_solution: int | None
     sample_counts: dict[str, int]
     heatmap: Heatmap | None = field(repr=False, metadata={"json": False})
     tree: NDArray[np.float64] | None = field(repr=False, metadata={"json": False})

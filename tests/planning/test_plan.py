@@ -34,6 +34,13 @@ def check(result: PlanResult, grid: GridMap) -> None:
     assert np.hypot(*(result.path[-1] - result.goal)) <= result.goal_tolerance + 1e-9
     assert np.isclose(result.cost, np.hypot(*np.diff(result.path, axis=0).T).sum())
     assert result.nodes >= len(result.path)
+    if result.nodes_at_first_solution is not None:
+        assert 2 <= result.nodes_at_first_solution <= result.nodes
+    steps = np.hypot(*np.diff(result.trajectory, axis=0).T)
+    assert steps.max() <= grid.resolution / 2 * (1 + 1e-9)
+    assert np.isclose(steps.sum(), result.cost)
+    assert grid.is_free(result.trajectory).all()
+    assert {*map(tuple, result.path)} <= {*map(tuple, result.trajectory)}
     assert result.total_s == result.inference_s + result.planning_s + result.simplify_s
 
 
@@ -49,6 +56,9 @@ def test_samplers_and_planners(two_walls: GridMap, planner: str, sampler: str) -
     assert result.first_solution_s is not None
     assert 0 < result.first_solution_s <= result.planning_s
     assert (len(result.progress) > 0) == ("RRTstar" in planner)
+    assert result.nodes_at_first_solution is not None
+    if "star" not in planner:
+        assert result.nodes_at_first_solution == result.nodes
     if len(result.progress):
         assert result.progress[0, 0] == result.first_solution_s
         assert (np.diff(result.progress[:, 1]) < 0).all()
@@ -160,6 +170,29 @@ def test_path_to_the_goal_itself(two_walls: GridMap, planner: str, sampler: str)
     np.testing.assert_array_equal(result.path[-1], GOAL)
 
 
+def test_nodes_at_the_first_solution_are_those_of_a_run_that_ends_there(
+    two_walls: GridMap,
+) -> None:
+    """RRT* adds a node per iteration or none: stopped there, it has as many."""
+    limits = {"time": 60, "range": 20, "seed": 4}
+    whole = plan(two_walls, START, GOAL, "RRTstar", "corridor", iterations=3000, **limits)
+    first = whole.nodes_at_first_solution
+    assert first is not None
+    assert first < whole.nodes
+    solved = [
+        (result.solved, result.nodes)
+        for count in range(1, 3000, 10)
+        if (
+            result := plan(
+                two_walls, START, GOAL, "RRTstar", "corridor", iterations=count, **limits
+            )
+        ).solved
+        or result.nodes >= first
+    ][:1]
+    assert solved[0][0]
+    assert first <= solved[0][1] <= first + 10
+
+
 def test_own_heatmap(two_walls: GridMap, corridor: Heatmap) -> None:
     result = plan(two_walls, START, GOAL, "RRT", time=5, range=20, heatmap=corridor, seed=0)
     check(result, two_walls)
@@ -172,7 +205,8 @@ def test_unsolved_is_said(two_walls: GridMap) -> None:
         two_walls, START, GOAL, "RRTstar", "uniform", time=5, iterations=20, range=5, seed=0
     )
     assert not result.solved
-    assert result.path.shape == (0, 2)
+    assert result.path.shape == result.trajectory.shape == (0, 2)
+    assert result.nodes_at_first_solution is None
     assert result.first_solution_s is None
     values = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     assert values["cost"] is None
@@ -188,6 +222,7 @@ def test_json_fields(two_walls: GridMap) -> None:
     assert set(values) >= {
         "solved", "planner", "sampler", "hook", "ompl_version", "seed", "path", "cost",
         "inference_s", "planning_s", "total_s", "nodes", "sample_counts", "first_solution_s",
+        "trajectory", "nodes_at_first_solution",
     }  # fmt: skip
     assert not {"tree", "heatmap"} & set(values)
     assert set(values["sample_counts"]) == {"learned", "uniform"}
