@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..common.validation import finite_number, positive_number, truth_value, whole_number
 from ..errors import ConfigError, MapError, show
+from ..maps.endpoints import Moves, snap_endpoints
 from ..maps.grid_map import GridMap
 from ..sampling.heatmap import Heatmap
 from ..sampling.options import SamplerOptions
@@ -21,8 +22,9 @@ from . import compat
 from .attach import Attachment, attach
 from .compat import ou
 from .heatmap_sources import LEARNED, UNIFORM, HeatmapSource, heatmap_source
-from .hooks import hangs_at_optimum, hook_of
+from .hooks import check_planner, hangs_at_optimum
 from .plan_result import PlanResult
+from .planner_names import planner_name
 from .problem import (
     Endpoints,
     checked_path,
@@ -49,6 +51,7 @@ def plan(
     iterations: int | None = None,
     range: float | None = None,
     radius: float = 0.0,
+    snap: float = 0.0,
     model: Predictor | str | PathLike[str] | None = None,
     heatmap: Heatmap | ArrayLike | None = None,
     simplify: bool = False,
@@ -63,7 +66,8 @@ def plan(
         grid: the map, or a file for :meth:`GridMap.load`.
         start: (x, y), world.
         goal: (x, y), world.
-        planner: OMPL's name of a geometric planner, such as ``"RRT"`` or ``"InformedRRTstar"``.
+        planner: a geometric planner by OMPL's name, such as ``"RRT"`` or ``"InformedRRTstar"``, or
+            as the literature writes it, ``"RRT*"``, ``"RRT-Connect"``...
         sampler: one of :data:`cbagan_ompl.planning.heatmap_sources.SAMPLERS`; ``"uniform"`` leaves
             OMPL's own sampler in place.
         time: limit of the planner's solve, seconds. RRT-like planners stop at their first
@@ -72,6 +76,8 @@ def plan(
         range: longest edge that the planner adds, world units; by default OMPL's choice (a
             fifth of the map's diagonal).
         radius: of the robot, world units; obstacles are inflated by it.
+        snap: how far a start or goal in an obstacle, in the margin around one, or in unknown space
+            is moved at most, to the nearest place where the robot may be, world units.
         model: for the learned sampler, a loaded model or the file of one; the bundled model by
             default.
         heatmap: to be sampled in place of the learned one: of this map, or an array (H, W) as
@@ -106,19 +112,23 @@ def plan(
         raise MapError(f"grid is a GridMap or the file of a map, got {show(grid)}")
     source = grid if isinstance(grid, GridMap) else GridMap.load(grid)
     space_map = source.inflated(radius)
+    moves: Moves = {}
+    if snap != 0:
+        distance = finite_number("snap", snap, 0.0)
+        (start, goal), moves = snap_endpoints(space_map, start, goal, distance)
     endpoints = space_map.check_task(start, goal)
     tolerance = space_map.resolution
     if goal_tolerance is not None:
         tolerance = finite_number("goal_tolerance", goal_tolerance, 0.0)
     options, seed = _with_seed(SamplerOptions.of(options, changes))
-    compat.planner_class(planner)
-    if sampler != UNIFORM:
-        hook_of(planner)
+    planner = planner_name(planner)
+    check_planner(planner, follows_heatmap=sampler != UNIFORM)
     name, make_heatmap = heatmap_source(sampler, model, heatmap)
     job = _Job(
         map_name=source.name,
         grid=space_map,
         endpoints=endpoints,
+        moves=moves,
         tolerance=tolerance,
         planner=planner,
         range=None if range is None else positive_number("range", range),
@@ -141,6 +151,7 @@ class _Job:
     map_name: str
     grid: GridMap
     endpoints: Endpoints
+    moves: Moves
     tolerance: float
     planner: str
     range: float | None
@@ -226,6 +237,7 @@ def _result(
         map=job.map_name,
         start=job.endpoints[0],
         goal=job.endpoints[1],
+        snapped=job.moves,
         goal_tolerance=job.tolerance,
         path=path,
         trajectory=follow_path(path, job.grid.resolution / 2),
