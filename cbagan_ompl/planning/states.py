@@ -87,6 +87,11 @@ def state_access(space: Any, seed: int | np.random.Generator | None = None) -> S
     )
 
 
+def read_pose(state: Any) -> tuple[float, float, float]:
+    """Return the (x, y, yaw) of a state of an SE2StateSpace."""
+    return state.getX(), state.getY(), state.getYaw()
+
+
 def space_of(si: Any) -> Any:
     """Return the state space of a space information.
 
