@@ -46,7 +46,7 @@ def snap_to_free(
     Raises:
         TaskError: it is no point, outside the map, or nothing within the distance is free.
     """
-    position = _check_position(grid, role, point)
+    position = check_position(grid, role, point)
     if grid.is_free(position):
         return position
     centre = grid.to_pixel(position)
@@ -67,7 +67,7 @@ def snap_to_free(
 
 
 def _check_free(grid: GridMap, role: str, point: ArrayLike) -> NDArray[np.float64]:
-    position = _check_position(grid, role, point)
+    position = check_position(grid, role, point)
     column, row = np.floor(grid.to_pixel(position)).astype(int).tolist()
     if not grid.free[row, column]:
         raise TaskError(
@@ -97,7 +97,17 @@ def check_point(role: str, point: ArrayLike) -> NDArray[np.float64]:
     return np.array([float(value) for value in values])
 
 
-def _check_position(grid: GridMap, role: str, point: ArrayLike) -> NDArray[np.float64]:
+def check_position(grid: GridMap, role: str, point: ArrayLike) -> NDArray[np.float64]:
+    """Return a position on a map as a (2,) array.
+
+    Args:
+        grid: the map.
+        role: of the position, for the message.
+        point: (x, y), world.
+
+    Raises:
+        TaskError: no point, or one outside of the map.
+    """
     position = check_point(role, point)
     column, row = np.floor(grid.to_pixel(position)).tolist()
     if not (0 <= column < grid.width and 0 <= row < grid.height):
