@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import floor, isnan, nan, pi, remainder
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -73,10 +73,10 @@ def descend(values: NDArray[np.float32], grid: GridMap, goal: ArrayLike) -> NDAr
     Raises:
         TaskError: a goal that is no point on the map.
     """
-    several = isinstance(goal, list | tuple | np.ndarray) and len(goal) and np.ndim(goal[0]) == 1
-    points = goal if several else [goal]
+    is_several = isinstance(goal, list | tuple | np.ndarray) and np.ndim(goal) > 1
+    points: Any = goal if is_several else [goal]
     goals = np.array([check_position(grid, "goal", point) for point in points])
-    cost = 1 / (values + np.float32(_LEAST_VALUE))
+    cost = np.reciprocal(values + np.float32(_LEAST_VALUE))
     angles = descent_directions(grid.free, cost, grid.to_pixel(goals))
     # A ROS map is turned by the yaw of its origin, and its y points up.
     return angles if grid.origin is None else np.float32(grid.origin[2]) - angles
@@ -95,7 +95,7 @@ def look_up(
     if heading is None:
         return np.full(len(points), np.nan)
     columns, rows = grid.to_pixel(points).astype(np.intp).T
-    return heading[rows, columns].astype(np.float64)
+    return np.asarray(heading[rows, columns], np.float64)
 
 
 def sample_headings(
