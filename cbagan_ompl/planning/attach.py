@@ -10,6 +10,7 @@ from typing import Any
 
 from ..errors import PlannerError, show
 from ..sampling.adaptation import AdaptiveMixture
+from ..sampling.headings import HeadingSampler
 from ..sampling.heatmap import Heatmap, check_heatmap
 from ..sampling.options import OPTIMIZING_SHARPNESS, SamplerOptions
 from ..sampling.sampler import HeatmapSampler
@@ -27,7 +28,8 @@ from .hooks import (
     stops_at_first,
 )
 from .monitor import PlannerMonitor, is_informed, is_monitored, release_forgotten
-from .states import StateAccess, position_bounds, state_access
+from .pose_headings import with_headings
+from .states import StateAccess, drives_backwards, position_bounds, state_access
 
 # OMPL's range of a planner that was given none, as a fraction of the extent of the space.
 _OMPL_RANGE = 0.2
@@ -168,7 +170,9 @@ def attach(
         options = replace(options, sharpness=sharpness)
     rng = options.generator()
     space = setup.getStateSpace()
-    states = state_access(space, rng)
+    heatmap = with_headings(setup, heatmap, options.heading)
+    headings = HeadingSampler(heatmap, options.heading, rng, drives_backwards(space))
+    states = state_access(space, headings)
     release_forgotten()
     injects = hook == GOAL_INJECTION
     monitor = (goal_monitor if injects else PlannerMonitor)(setup, states)
