@@ -47,10 +47,12 @@ class Attachment:
         >>> from ompl import geometric as og, util as ou
         >>> from cbagan_ompl import GridMap, Heatmap, tasks_of
         >>> from cbagan_ompl.planning.problem import make_setup
+        >>> from cbagan_ompl.planning.workspace import Workspace
         >>> ou.setLogLevel(ou.LOG_NONE)
         >>> grid = GridMap.load("bundled:maze")
         >>> task = tasks_of("bundled:maze", grid)[0]
-        >>> setup = make_setup(grid, grid.check_task(task.start, task.goal), tolerance=1.0)
+        >>> endpoints = grid.check_task(task.start, task.goal)
+        >>> setup = make_setup(Workspace(grid), endpoints, tolerance=1.0)
         >>> setup.setPlanner(og.RRTstar(setup.getSpaceInformation()))
         >>> attachment = attach(setup, Heatmap.uniform(grid))
         >>> attachment.hook, attachment.sample_counts
@@ -149,10 +151,12 @@ def attach(
         >>> from ompl import base as ob, geometric as og, util as ou
         >>> from cbagan_ompl import GridMap, GridValidityChecker, Heatmap, tasks_of
         >>> from cbagan_ompl.planning.problem import make_setup
+        >>> from cbagan_ompl.planning.workspace import Workspace
         >>> ou.setLogLevel(ou.LOG_NONE)
         >>> grid = GridMap.load("bundled:rooms")
         >>> task = tasks_of("bundled:rooms", grid)[0]
-        >>> setup = make_setup(grid, grid.check_task(task.start, task.goal), tolerance=1.0)
+        >>> endpoints = grid.check_task(task.start, task.goal)
+        >>> setup = make_setup(Workspace(grid), endpoints, tolerance=1.0)
         >>> setup.setPlanner(og.RRT(setup.getSpaceInformation()))
         >>> with attach(setup, Heatmap.corridor(grid, task.start, task.goal), seed=0) as attachment:
         ...     _ = setup.solve(5.0)

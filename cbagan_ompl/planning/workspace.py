@@ -30,7 +30,7 @@ class Workspace:
 
     Attributes:
         source: the map.
-        robot: what moves.
+        robot: what moves, a point by default.
 
     Example:
         >>> workspace = Workspace(GridMap.load("bundled:rooms"), Robot.rectangle(12, 6))
@@ -39,7 +39,7 @@ class Workspace:
     """
 
     source: GridMap
-    robot: Robot
+    robot: Robot = Robot.point()
 
     @cached_property
     def grid(self) -> GridMap:
@@ -49,7 +49,7 @@ class Workspace:
     @cached_property
     def checker(self) -> ShapeChecker:
         """The exact check of poses."""
-        return ShapeChecker(self.source, self.robot)
+        return ShapeChecker.of(self.source, self.robot)
 
     def check_task(self, start: ArrayLike, goal: ArrayLike) -> Endpoints:
         """Return start and goal as arrays, or raise if they cannot be planned for.

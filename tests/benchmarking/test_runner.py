@@ -25,7 +25,7 @@ def test_an_interrupt_while_a_process_starts_leaves_none(
     two_walls: GridMap, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     settings = Settings(("RRTstar",), ("uniform",), runs=99)
-    tasks = [BenchmarkTask(two_walls, i, Task((10, 10), (240, 240))) for i in range(3)]
+    tasks = [BenchmarkTask(Workspace(two_walls), i, Task((10, 10), (240, 240))) for i in range(3)]
     jobs = [Job(task, settings, tmp_path / f"{task.name}.log") for task in tasks]
     start, started = ForkServerProcess.start, []
 
@@ -78,6 +78,7 @@ from cbagan_ompl.benchmarking.runner import run_jobs
 from cbagan_ompl.benchmarking.tasks import BenchmarkTask
 from cbagan_ompl.benchmarking.settings import Settings
 from cbagan_ompl.benchmarking.worker import Job
+from cbagan_ompl.planning.workspace import Workspace
 
 class Telling(BenchmarkTask):
     def __reduce__(self):
