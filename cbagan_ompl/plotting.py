@@ -123,8 +123,8 @@ def draw_plan(
         handles.append(_draw_path(axes, grid.to_pixel(result.trajectory[:, :2])))
     if result.robot.has_heading:
         handles += _draw_poses(axes, result, grid)
-    endpoints = (grid.to_pixel(endpoint[:2]) for endpoint in (result.start, result.goal))
-    handles += mark_endpoints(axes, *endpoints)
+    start, goal = (grid.to_pixel(endpoint[:2]) for endpoint in (result.start, result.goal))
+    handles += mark_endpoints(axes, start, goal)
     left, top, right, bottom = _visible_box(grid)
     axes.set(xlim=(left, right), ylim=(bottom, top), xticks=[], yticks=[])
     return handles

@@ -127,6 +127,7 @@ class Settings:
                 saved["adaptation"] = list(self.sampler_options.adaptation.names)
                 saved["sharpness"] = self.sampler_options.sharpness
                 saved["seed"] = self.seed
+                saved["heading"] = asdict(self.sampler_options.heading)
             elif name == "robot":
                 saved[name] = asdict(self.robot)
             else:

@@ -67,8 +67,8 @@ def add_benchmark_parser(commands: Any) -> None:
         "--tasks",
         metavar="FILE",
         help="tasks for the maps: .csv (map,start_x,start_y,goal_x,goal_y[,start_yaw,"
-        "goal_yaw,optimal_cost,family], where family is the kind of map) or MovingAI .scen (default: those that come "
-        "with a map, otherwise random ones)",
+        "goal_yaw,optimal_cost,family], where family is the kind of map) or MovingAI .scen "
+        "(default: those that come with a map, otherwise random ones)",
     )
     tasks.add_argument(
         "--tasks-per-map",

@@ -319,7 +319,7 @@ class _States(ob.StateValidityChecker):  # type: ignore[misc]
         self._guard = guard
 
     def isValid(self, state: Any) -> bool:  # noqa: N802
-        return not self._guard.tripped and self._is_valid(state)
+        return not self._guard.tripped and bool(self._is_valid(state))
 
 
 class _Motions(ob.MotionValidator):  # type: ignore[misc]
@@ -345,4 +345,5 @@ class _Motions(ob.MotionValidator):  # type: ignore[misc]
         self.checks += 1
         if self._history is not None and self.checks % _LOOK_EVERY == 0:
             self._history.look()
-        return self._check(s1, s2, *last_valid)
+        valid: bool = self._check(s1, s2, *last_valid)
+        return valid

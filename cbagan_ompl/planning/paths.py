@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -56,9 +57,7 @@ def path_cost(setup: Any, workspace: Workspace, path: NDArray[np.float64]) -> fl
         return float(np.hypot(*np.diff(path, axis=0).T).sum())
     space = setup.getStateSpace()
     states = [workspace.make_state(space, pose) for pose in path]
-    return sum(
-        float(space.distance(_raw(a), _raw(b))) for a, b in zip(states[:-1], states[1:], strict=True)
-    )
+    return sum(float(space.distance(_raw(a), _raw(b))) for a, b in pairwise(states))
 
 
 def follow_path(
@@ -80,10 +79,11 @@ def follow_path(
     space = setup.getStateSpace()
     states = [workspace.make_state(space, endpoint) for endpoint in path]
     passed = compat.new_state(space)
-    pieces = [path[:1]]
-    for start, end in zip(states[:-1], states[1:], strict=True):
-        count = max(1, int(np.ceil(workspace.reach_of_motion(space, start, end) / step)))
-        for i in range(1, count + 1):
+    points = [path[0]]
+    for (start, end), way_point in zip(pairwise(states), path[1:], strict=True):
+        count = int(np.ceil(workspace.reach_of_motion(space, start, end) / step))
+        for i in range(1, count):
             space.interpolate(_raw(start), _raw(end), i / count, _raw(passed))
-            pieces.append(workspace.read_states([_raw(passed)]))
-    return np.vstack(pieces)
+            points.append(workspace.read_states([_raw(passed)])[0])
+        points.append(way_point)
+    return np.array(points)

@@ -12,7 +12,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..common.validation import finite_number, positive_number, truth_value, whole_number
+from ..common.validation import (
+    finite_number,
+    is_finite_number,
+    positive_number,
+    truth_value,
+    whole_number,
+)
 from ..errors import ConfigError, MapError, RobotError, show
 from ..maps.endpoints import Moves
 from ..maps.grid_map import GridMap
@@ -99,7 +105,7 @@ def plan(
         The result; not finding a path in time is no error, ``solved`` is False then.
 
     Raises:
-        MapError: an unusable map, or one that the robot fits nowhere on.
+        MapError: an unusable map or radius, or a map that the robot fits nowhere on.
         RobotError: no robot, or a robot and a radius.
         TaskError: start or goal outside, in an obstacle, equal, or in separate parts.
         PlannerError: an unknown planner, or one that no hook reaches on this OMPL.
@@ -174,12 +180,13 @@ def _robot_of(robot: Robot | None, radius: float) -> Robot:
         raise RobotError(
             f"robot is a Robot, such as Robot.rectangle(length, width), got {show(robot)}"
         )
-    length = finite_number("radius", radius, 0.0)
-    if length == 0:
+    if not is_finite_number(radius) or radius < 0:
+        raise MapError(f"the robot radius must be a length of at least 0, got {show(radius)}")
+    if radius == 0:
         return robot or Robot.point()
     if robot is not None:
         raise RobotError("give robot or radius, which is short for robot=Robot.disc(radius)")
-    return Robot.disc(length)
+    return Robot.disc(radius)
 
 
 def _with_seed(options: SamplerOptions) -> tuple[SamplerOptions, int]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from math import remainder, tau
 from typing import Any
 
@@ -11,8 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import TaskError
+from ..maps.endpoints import Moves, snap_endpoints
 from ..maps.grid_map import GridMap
-from ..robots.poses import check_poses, position_map
+from ..robots.poses import check_poses, position_map, snap_poses
 from ..robots.robot import Robot
 from ..robots.shape_checker import ShapeChecker
 from . import compat
@@ -39,7 +41,7 @@ class Workspace:
     """
 
     source: GridMap
-    robot: Robot = Robot.point()
+    robot: Robot = field(default_factory=Robot.point)
 
     @cached_property
     def grid(self) -> GridMap:
@@ -71,6 +73,24 @@ class Workspace:
                     "x, y alone, or a robot with a shape or a turning radius"
                 )
         return self.grid.check_task(start, goal)
+
+    def snap(self, start: ArrayLike, goal: ArrayLike, distance: float) -> tuple[Endpoints, Moves]:
+        """Return start and goal, each moved to the nearest place where the robot may be.
+
+        Args:
+            start: as for :meth:`check_task`.
+            goal: the same.
+            distance: the farthest that each is moved, world units.
+
+        Returns:
+            The endpoints, and those that were moved, see :func:`.endpoints.snap_endpoints`.
+
+        Raises:
+            TaskError: one of them is none, outside the map, or nothing near it is free.
+        """
+        if self.robot.has_heading:
+            return snap_poses(self.checker, start, goal, distance)
+        return snap_endpoints(self.grid, start, goal, distance)
 
     def make_space(self) -> Any:
         """Return the state space of the robot, with the bounds of the map."""
@@ -150,5 +170,5 @@ class Workspace:
         states = [self.make_state(si.getStateSpace(), pose) for pose in path]
         return all(checker.isValid(compat.typed_state(state)) for state in states) and all(
             motions.checkMotion(compat.typed_state(a), compat.typed_state(b))
-            for a, b in zip(states[:-1], states[1:], strict=True)
+            for a, b in pairwise(states)
         )

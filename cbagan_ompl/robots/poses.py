@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..common.validation import is_finite_number
 from ..errors import TaskError, show
-from ..maps.endpoints import check_position
+from ..maps.endpoints import Moves, check_position
 from ..maps.grid_map import GridMap
 from .robot import Robot
 from .shape_checker import ShapeChecker
@@ -60,8 +60,8 @@ def check_pose(role: str, pose: ArrayLike) -> NDArray[np.float64]:
         values = None
     if isinstance(values, list) and len(values) == 2:
         raise TaskError(
-            f"{role} {show(pose)} has no yaw, but the robot has a heading: give x, y, yaw, the last "
-            "in radians"
+            f"{role} {show(pose)} has no yaw, but the robot has a heading: give x, y, yaw, "
+            "the last in radians"
         )
     if not (isinstance(values, list) and len(values) == 3 and all(map(is_finite_number, values))):
         raise TaskError(
@@ -104,9 +104,65 @@ def check_poses(checker: ShapeChecker, start: ArrayLike, goal: ArrayLike) -> Pos
     return poses
 
 
-def describe_collision(
-    grid: GridMap, robot: Robot, role: str, pose: NDArray[np.float64]
-) -> str:
+def snap_poses(
+    checker: ShapeChecker, start: ArrayLike, goal: ArrayLike, distance: float
+) -> tuple[Poses, Moves]:
+    """Return start and goal, each moved to the nearest place where the robot fits as it is turned.
+
+    Args:
+        checker: of the map and the robot.
+        start: (x, y, yaw), world, radians.
+        goal: the same.
+        distance: the farthest that each is moved, world units.
+
+    Returns:
+        The poses, and for those that were moved, by "start" and "goal", the pose that was ``given``
+        and the ``distance``, world units.
+
+    Raises:
+        TaskError: one of them is no pose, outside the map, or nothing near it is free.
+    """
+    moves: Moves = {}
+    found = []
+    for role, given in (("start", start), ("goal", goal)):
+        pose = check_pose(role, given)
+        check_position(checker.grid, role, pose[:2])
+        place = _nearest_free(checker, pose, distance)
+        if place is None:
+            raise TaskError(
+                describe_collision(checker.grid, checker.robot, role, pose)
+                + f": nothing within {distance:g} of it is free with this yaw"
+            )
+        moved = float(np.hypot(*(place - pose)[:2]))
+        if moved > 0:
+            moves[role] = {"given": pose.tolist(), "distance": moved}
+        found.append(place)
+    return (found[0], found[1]), moves
+
+
+def _nearest_free(
+    checker: ShapeChecker, pose: NDArray[np.float64], distance: float
+) -> NDArray[np.float64] | None:
+    """Return the nearest pose of the same yaw that is free, to within half a pixel."""
+    x, y, yaw = pose.tolist()
+    if checker.pose_is_free(x, y, yaw):
+        return pose
+    step = checker.grid.resolution / 2
+    low, high = checker.grid.bounds
+    ticks = [
+        np.arange(max(-distance, a - c), min(distance, b - c) + step, step)
+        for a, b, c in zip(low, high, (x, y), strict=True)
+    ]
+    offsets = np.stack(np.meshgrid(*ticks), axis=-1).reshape(-1, 2)
+    lengths = np.hypot(*offsets.T)
+    order = np.argsort(lengths, kind="stable")
+    for dx, dy in offsets[order[lengths[order] <= distance]].tolist():
+        if checker.pose_is_free(x + dx, y + dy, yaw):
+            return np.array([x + dx, y + dy, yaw])
+    return None
+
+
+def describe_collision(grid: GridMap, robot: Robot, role: str, pose: NDArray[np.float64]) -> str:
     """Return which part of a robot touches what at a pose that collides.
 
     Args:

@@ -229,9 +229,8 @@ class Heatmap:
         endpoints = self.grid.to_pixel(self.grid.check_task(start, goal))
         if self.connects(start, goal):
             return self
-        return Heatmap(
-            bridge(self.values, self.region, self.grid, endpoints), self.grid, self.heading
-        )
+        values = bridge(self.values, self.region, self.grid, endpoints)
+        return Heatmap(values, self.grid, self.heading)
 
     def with_heading(self, heading: ArrayLike | None) -> Heatmap:
         """Return this heat map with other headings.

@@ -143,8 +143,8 @@ class SamplerOptions:
             ``values ** sharpness``. It is above 0 and at most :data:`LARGEST_SHARPNESS`. With None
             the planner decides, see :func:`cbagan_ompl.attach`.
         adaptation: how the mixture follows the planner's tree, see :class:`Adaptation`.
-        heading: how the headings of poses follow those of the heat map, see :class:`HeadingSpread`.
         seed: an int of at least 0, or a generator; the same seed gives the same samples.
+        heading: how the headings of poses follow those of the heat map, see :class:`HeadingSpread`.
 
     Raises:
         ConfigError: a value of the wrong type or out of range; the message names the option.
@@ -157,8 +157,8 @@ class SamplerOptions:
     uniform_fraction: float = DEFAULT_UNIFORM_FRACTION
     sharpness: float | None = None
     adaptation: Adaptation = FULL_ADAPTATION
-    heading: HeadingSpread = HeadingSpread()
     seed: int | np.random.Generator | None = None
+    heading: HeadingSpread = HeadingSpread()
 
     def __post_init__(self) -> None:
         fraction, sharpness = self.uniform_fraction, self.sharpness

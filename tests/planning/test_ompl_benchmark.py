@@ -10,11 +10,11 @@ from cbagan_ompl import GridMap, Heatmap, HeatmapError, PlannerError
 from cbagan_ompl.planning.compat import BOOST_PYTHON
 from cbagan_ompl.planning.ompl_benchmark import (
     PlannerVariant,
-from cbagan_ompl.planning.workspace import Workspace
     RunOptions,
     check_variants,
     run_benchmark,
 )
+from cbagan_ompl.planning.workspace import Workspace
 
 # A planner that no hook reaches.
 UNREACHED = "EITstar" if BOOST_PYTHON else "BITstar"
