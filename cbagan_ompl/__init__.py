@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     )
     from .planning.plan import plan
     from .planning.plan_result import PlanResult
+    from .planning.robot_validity import RobotMotionValidator, RobotValidityChecker
     from .planning.validity import GridMotionValidator, GridValidityChecker
     from .plotting import save_figure
     from .robots.robot import Robot
@@ -71,6 +72,8 @@ __all__ = [
     "Predictor",
     "Robot",
     "RobotError",
+    "RobotMotionValidator",
+    "RobotValidityChecker",
     "SamplerOptions",
     "Task",
     "TaskError",
@@ -101,6 +104,7 @@ _HOMES = {
         "state_sampler_allocator",
         "valid_state_sampler_allocator",
     ),
+    "planning.robot_validity": ("RobotMotionValidator", "RobotValidityChecker"),
     "planning.validity": ("GridMotionValidator", "GridValidityChecker"),
     "plotting": ("save_figure",),
     "robots.robot": ("Robot",),
