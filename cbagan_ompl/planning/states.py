@@ -139,6 +139,25 @@ def pose_space(space: Any) -> Any:
     return None
 
 
+def is_distance_bound(space: Any) -> bool:
+    """Return whether no distance in a space is below the Euclidean one of the positions.
+
+    It is so in the plane and along Dubins and Reeds-Shepp curves. In other spaces of poses OMPL
+    adds the distances of the parts of a state, each times a weight: positions weigh 1 unless the
+    user has set another one.
+
+    Args:
+        space: one that :func:`state_access` serves.
+    """
+    poses = pose_space(space)
+    if poses is None:
+        return True
+    weight = 1.0 if poses is space else space.getSubspaceWeight(0)
+    if not isinstance(poses, ob.DubinsStateSpace | ob.ReedsSheppStateSpace):
+        weight *= poses.getSubspaceWeight(0)
+    return bool(weight >= 1)
+
+
 def drives_backwards(space: Any) -> bool:
     """Return whether motions in a space go backwards as well as forwards.
 
