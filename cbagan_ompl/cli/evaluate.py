@@ -52,7 +52,8 @@ def add_evaluate_parser(commands: Any) -> None:
         "--model",
         action="append",
         metavar="FILE",
-        help="exported model; may be repeated (default: the bundled one)",
+        help="exported model, or the name of a bundled one; may be repeated (default: the default "
+        "model)",
     )
     parser.add_argument(
         "--predictions",
