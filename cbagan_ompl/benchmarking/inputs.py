@@ -100,12 +100,12 @@ def _differences(there: Any, now: Any, place: str = "") -> Iterator[str]:
 
 
 def _models(settings: Settings) -> dict[str, Path]:
-    models = {sampler: Path(path) for sampler, path in settings.models.items()}
-    if LEARNED in set(settings.samplers) - set(models) - set(settings.heatmap_dirs):
-        from ..inference.model_files import bundled_model
+    from ..inference.model_files import find_model
 
-        models[LEARNED] = bundled_model()
-    return models
+    models: dict[str, str | None] = dict(settings.models)
+    if LEARNED in set(settings.samplers) - set(models) - set(settings.heatmap_dirs):
+        models[LEARNED] = None
+    return {sampler: find_model(model) for sampler, model in models.items()}
 
 
 def _describe_map(task: BenchmarkTask) -> dict[str, Any]:

@@ -109,7 +109,8 @@ def add_benchmark_parser(commands: Any) -> None:
         default=[],
         type=_model,
         metavar="[NAME=]FILE",
-        help="exported model of the learned sampler (default: the bundled one); with a name, "
+        help="exported model of the learned sampler, or the name of a bundled one such as cbagan "
+        "(default: the default model); with NAME, "
         "another sampler NAME with the heat maps of this model; may be repeated",
     )
     add_sampler_options(comparison)

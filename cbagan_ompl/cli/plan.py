@@ -106,7 +106,11 @@ def _add_sampler(sampler: Any) -> None:
         metavar="NAME",
         help=f"{describe_samplers()} (default: learned)",
     )
-    sampler.add_argument("--model", metavar="FILE", help="exported model (default: the bundled)")
+    sampler.add_argument(
+        "--model",
+        metavar="FILE",
+        help="exported model, or the name of a bundled one such as cbagan",
+    )
     sampler.add_argument(
         "--heatmap",
         metavar="FILE",
