@@ -111,7 +111,7 @@ def plan(
         tolerance = finite_number("goal_tolerance", goal_tolerance, 0.0)
     options, seed = _with_seed(SamplerOptions.of(options, changes))
     compat.planner_class(planner)
-    if sampler != UNIFORM:
+    if not (isinstance(sampler, str) and sampler == UNIFORM):
         hook_of(planner)
     name, make_heatmap = heatmap_source(sampler, model, heatmap)
     job = _Job(

@@ -5,9 +5,9 @@ from __future__ import annotations
 from math import floor
 from typing import Any
 
-from ..errors import MapError, PlannerError, show
+from ..errors import PlannerError
 from ..maps.collision import segment_is_free
-from ..maps.grid_map import GridMap
+from ..maps.grid_map import GridMap, check_grid
 from .compat import ob
 from .states import StateAccess, space_of, state_access
 
@@ -27,7 +27,7 @@ class GridValidityChecker(ob.StateValidityChecker):  # type: ignore[misc]
 
     Example:
         >>> from ompl import base as ob
-        >>> from cbagan_ompl import GridMap
+        >>> from cbagan_ompl import GridMap, check_grid
         >>> space = ob.RealVectorStateSpace(2)
         >>> space.setBounds(0, 256)
         >>> si = ob.SpaceInformation(space)
@@ -35,7 +35,7 @@ class GridValidityChecker(ob.StateValidityChecker):  # type: ignore[misc]
     """
 
     def __init__(self, si: Any, grid: GridMap) -> None:
-        _check_grid(grid)
+        check_grid(grid)
         self._read = state_access(space_of(si)).read
         super().__init__(si)
         self._cells, self._width, self._height = grid.cells, grid.width, grid.height
@@ -72,7 +72,7 @@ class GridMotionValidator(ob.MotionValidator):  # type: ignore[misc]
 
     Example:
         >>> from ompl import base as ob
-        >>> from cbagan_ompl import GridMap
+        >>> from cbagan_ompl import GridMap, check_grid
         >>> space = ob.RealVectorStateSpace(2)
         >>> space.setBounds(0, 256)
         >>> si = ob.SpaceInformation(space)
@@ -80,7 +80,7 @@ class GridMotionValidator(ob.MotionValidator):  # type: ignore[misc]
     """
 
     def __init__(self, si: Any, grid: GridMap) -> None:
-        _check_grid(grid)
+        check_grid(grid)
         self._space = space_of(si)
         self._read = _straight_state_access(self._space).read
         super().__init__(si)
@@ -121,11 +121,6 @@ class GridMotionValidator(ob.MotionValidator):  # type: ignore[misc]
         last_valid.second = low
         if last_valid.first is not None:
             self._space.interpolate(s1, s2, low, last_valid.first)
-
-
-def _check_grid(grid: object) -> None:
-    if not isinstance(grid, GridMap):
-        raise MapError(f"expected a GridMap, got {show(grid)}; load one with GridMap.load(path)")
 
 
 def _straight_state_access(space: Any) -> StateAccess:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from functools import cached_property
 from os import PathLike
-from pathlib import Path
 from typing import Any, SupportsIndex
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..common.files import as_path
 from ..common.validation import random_generator, whole_number
 from ..errors import HeatmapError, show
 from ..maps.connectivity import in_one_component, label_components
@@ -64,7 +64,7 @@ class Heatmap:
     """
 
     def __init__(self, values: ArrayLike, grid: GridMap) -> None:
-        _check_grid(grid)
+        check_grid(grid, HeatmapError)
         try:
             raw = np.asarray(values)
         except Exception as error:  # rows of different lengths, or whatever the class raises
@@ -109,10 +109,8 @@ class Heatmap:
             ...     Heatmap.load(path, GridMap([[1, 1]])).region.tolist()
             [[False, True]]
         """
-        _check_grid(grid)
-        if not isinstance(path, str | PathLike):
-            raise HeatmapError(f"the file of a heat map is a path, got {show(path)}")
-        return cls(read_heatmap_values(Path(path), grid.shape), grid)
+        check_grid(grid, HeatmapError)
+        return cls(read_heatmap_values(as_path(path, HeatmapError), grid.shape), grid)
 
     @classmethod
     def uniform(cls, grid: GridMap) -> Heatmap:
@@ -125,7 +123,7 @@ class Heatmap:
             >>> Heatmap.uniform(GridMap([[1, 0], [1, 1]])).values.tolist()
             [[1.0, 0.0], [1.0, 1.0]]
         """
-        _check_grid(grid)
+        check_grid(grid, HeatmapError)
         return cls(grid.free, grid)
 
     @classmethod
@@ -144,7 +142,7 @@ class Heatmap:
             >>> Heatmap.straight_line(GridMap.load("bundled:rooms"), (20, 20), (230, 20))
             Heatmap('rooms', region 6% of free space)
         """
-        _check_grid(grid)
+        check_grid(grid, HeatmapError)
         endpoints = grid.check_task(start, goal)
         return cls(
             paint_band(grid.shape, grid.to_pixel(endpoints), half_width(grid, _CORRIDOR_FRACTION)),
@@ -171,7 +169,7 @@ class Heatmap:
             >>> heatmap.connects((20, 20), (230, 230))
             True
         """
-        _check_grid(grid)
+        check_grid(grid, HeatmapError)
         endpoints = grid.to_pixel(grid.check_task(start, goal))
         pixels = shortest_path(grid.free, *pixel_pair(endpoints))
         assert pixels is not None, "check_task has made sure that a path exists"

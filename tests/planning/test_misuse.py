@@ -1,0 +1,314 @@
+"""Misuse of the public API: every wrong argument ends in an error of this package, or works."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from decimal import Decimal
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cbagan_ompl
+from cbagan_ompl import (
+    Adaptation,
+    CbaganOmplError,
+    GridMap,
+    GridMotionValidator,
+    GridValidityChecker,
+    Heatmap,
+    HeatmapStateSampler,
+    HeatmapValidStateSampler,
+    SamplerOptions,
+    Task,
+    attach,
+    load_model,
+    load_tasks,
+    plan,
+    save_figure,
+    state_sampler_allocator,
+    tasks_of,
+    valid_state_sampler_allocator,
+)
+from cbagan_ompl.planning.compat import og, ou
+from cbagan_ompl.planning.problem import make_setup
+from cbagan_ompl.sampling.sampler import HeatmapSampler
+
+GRID = GridMap(np.ones((24, 24), np.bool_), name="empty")
+START, GOAL = (2.5, 2.5), (20.5, 20.5)
+HEATMAP = Heatmap.uniform(GRID)
+
+
+class Hostile:
+    """Raises whatever it is asked."""
+
+    def __getattr__(self, name: str) -> Any:
+        raise RuntimeError(name)
+
+    def __float__(self) -> float:
+        raise RuntimeError("float")
+
+    def __index__(self) -> int:
+        raise RuntimeError("index")
+
+    def __array__(self, *_: Any, **__: Any) -> Any:
+        raise RuntimeError("array")
+
+    def __eq__(self, other: object) -> bool:
+        raise RuntimeError("eq")
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        raise RuntimeError("repr")
+
+
+#: Values that are wrong in most places, by what they are called in the names of the tests.
+POOL: dict[str, Any] = {
+    "none": None,
+    "true": True,
+    "zero": 0,
+    "five": 5,
+    "minus": -1,
+    "huge": 10**400,
+    "longer": 10**5000,
+    "half": 1.5,
+    "tiny": 1e-300,
+    "large": 1e300,
+    "nan": float("nan"),
+    "inf": float("inf"),
+    "complex": 1 + 2j,
+    "decimal": Decimal("1.5"),
+    "fraction": Fraction(3, 2),
+    "decimal-nan": Decimal("nan"),
+    "text": "x",
+    "number-text": "1",
+    "empty-text": "",
+    "nul": "a\0b",
+    "surrogate": "\udc80",
+    "bytes": b"x",
+    "path": Path("/nonexistent/x.png"),
+    "folder": Path("/"),
+    "list": [],
+    "nested": [[[1]]],
+    "ragged": [[1, 2], [3]],
+    "dict": {"a": 1},
+    "set": {1},
+    "pair": (3.0, 3.0),
+    "triple": (1.0, 2.0, 3.0),
+    "ones": np.ones((24, 24)),
+    "bits": np.ones((24, 24), np.bool_),
+    "other-shape": np.ones((3, 5)),
+    "empty-array": np.empty((0, 2)),
+    "objects": np.array([[None, "x"]], dtype=object),
+    "object-zero": np.array(None, dtype=object),
+    "dates": np.array(["2020-01-01"], dtype="datetime64[D]"),
+    "records": np.zeros(3, dtype=[("a", "f8"), ("b", "i4")]),
+    "strings": np.array([["1", "2"]]),
+    "int8": np.int8(1),
+    "float16": np.float16(0.5),
+    "generator": np.random.default_rng(0),
+    "class": int,
+    "function": len,
+    "hostile": Hostile(),
+    "module": np,
+    "grid": GRID,
+    "heatmap": HEATMAP,
+    "options": SamplerOptions(),
+    "adaptation": Adaptation(),
+    "task": Task(START, GOAL),
+    "error": CbaganOmplError("x"),
+}
+
+
+def fresh_setup() -> Any:
+    setup = make_setup(GRID, GRID.check_task(START, GOAL), 1.0)
+    setup.setPlanner(og.RRT(setup.getSpaceInformation()))
+    return setup
+
+
+def run_plan(**changes: Any) -> object:
+    arguments = {"grid": GRID, "start": START, "goal": GOAL, "planner": "RRT", "time": 0.05}
+    arguments |= {"sampler": "uniform", "seed": 1}
+    return plan(**(arguments | changes))
+
+
+def run_attach(setup: Any = None, heatmap: Any = HEATMAP, **changes: Any) -> None:
+    attach(fresh_setup() if setup is None else setup, heatmap, **changes).detach()
+
+
+def without_planner() -> Any:
+    return make_setup(GRID, GRID.check_task(START, GOAL), 1.0)
+
+
+def space_information() -> Any:
+    return fresh_setup().getSpaceInformation()
+
+
+def run_figure(**changes: Any) -> None:
+    save_figure(**({"result": run_plan(), "grid": GRID, "path": "/dev/null/x.png"} | changes))
+
+
+#: Callables of the public API, by name, each with one argument that gets every value of the pool.
+CALLS: dict[str, Callable[[Any], object]] = {
+    # Numbers, points, maps.
+    "GridMap(free)": GridMap,
+    "GridMap(resolution)": lambda value: GridMap([[1]], value),
+    "GridMap(origin)": lambda value: GridMap([[1]], 1.0, value),
+    "GridMap(origin-x)": lambda value: GridMap([[1]], 1.0, (value, 0.0, 0.0)),
+    "GridMap(name)": lambda value: GridMap([[1]], name=value),
+    "GridMap(unknown)": lambda value: GridMap(np.ones((24, 24)), unknown=value),
+    "GridMap.load": GridMap.load,
+    "GridMap.inflated": GRID.inflated,
+    "GridMap.is_free": GRID.is_free,
+    "GridMap.to_pixel": GRID.to_pixel,
+    "GridMap.to_world": GRID.to_world,
+    "GridMap.path_is_free": GRID.path_is_free,
+    "GridMap.check_task": lambda value: GRID.check_task(value, GOAL),
+    "GridMap.check_task(x)": lambda value: GRID.check_task((value, 3.0), GOAL),
+    # Heat maps and options.
+    "Heatmap(values)": lambda value: Heatmap(value, GRID),
+    "Heatmap(grid)": lambda value: Heatmap(np.ones((24, 24)), value),
+    "Heatmap.load(path)": lambda value: Heatmap.load(value, GRID),
+    "Heatmap.load(grid)": lambda value: Heatmap.load("x.npy", value),
+    "Heatmap.uniform": Heatmap.uniform,
+    "Heatmap.corridor(grid)": lambda value: Heatmap.corridor(value, START, GOAL),
+    "Heatmap.corridor(start)": lambda value: Heatmap.corridor(GRID, value, GOAL),
+    "Heatmap.straight_line(grid)": lambda value: Heatmap.straight_line(value, START, GOAL),
+    "Heatmap.straight_line(goal)": lambda value: Heatmap.straight_line(GRID, START, value),
+    "Heatmap.connects": lambda value: HEATMAP.connects(value, GOAL),
+    "Heatmap.connected": lambda value: HEATMAP.connected(START, value),
+    "Heatmap.sample(n)": HEATMAP.sample,
+    "Heatmap.sample(rng)": lambda value: HEATMAP.sample(1, value),
+    "Adaptation": Adaptation,
+    "Adaptation.of": Adaptation.of,
+    "Adaptation.of(name)": lambda value: Adaptation.of([value]),
+    "SamplerOptions(uniform_fraction)": lambda value: SamplerOptions(uniform_fraction=value),
+    "SamplerOptions(sharpness)": lambda value: SamplerOptions(sharpness=value),
+    "SamplerOptions(adaptation)": lambda value: SamplerOptions(adaptation=value),
+    "SamplerOptions(seed)": lambda value: SamplerOptions(seed=value),
+    "HeatmapSampler(heatmap)": HeatmapSampler,
+    "HeatmapSampler(options)": lambda value: HeatmapSampler(HEATMAP, value),
+    # Planning.
+    **{
+        f"plan({name})": lambda value, name=name: run_plan(**{name: value})
+        for name in (
+            "grid",
+            "start",
+            "goal",
+            "planner",
+            "sampler",
+            "iterations",
+            "range",
+            "radius",
+            "model",
+            "heatmap",
+            "simplify",
+            "goal_tolerance",
+            "keep_tree",
+            "options",
+            "uniform_fraction",
+            "sharpness",
+            "adaptation",
+            "seed",
+            "unknown_keyword",
+        )
+    },  # fmt: skip
+    "plan(time)": lambda value: run_plan(time=value, iterations=500),
+    "plan(own heatmap)": lambda value: run_plan(heatmap=value, sampler="learned"),
+    "plan(own model)": lambda value: run_plan(model=value, sampler="learned"),
+    "attach(setup)": lambda value: run_attach(value),
+    "attach(heatmap)": lambda value: run_attach(heatmap=value),
+    "attach(options)": lambda value: run_attach(options=value),
+    "attach(seed)": lambda value: run_attach(seed=value),
+    "attach(unknown_keyword)": lambda value: run_attach(unknown_keyword=value),
+    "HeatmapStateSampler(space)": lambda value: HeatmapStateSampler(value, HEATMAP),
+    "HeatmapStateSampler(heatmap)": lambda value: HeatmapStateSampler(
+        fresh_setup().getStateSpace(), value
+    ),
+    "HeatmapValidStateSampler(si)": lambda value: HeatmapValidStateSampler(value, HEATMAP),
+    "HeatmapValidStateSampler(heatmap)": lambda value: HeatmapValidStateSampler(
+        space_information(), value
+    ),
+    "state_sampler_allocator": state_sampler_allocator,
+    "valid_state_sampler_allocator": valid_state_sampler_allocator,
+    "GridValidityChecker(si)": lambda value: GridValidityChecker(value, GRID),
+    "GridValidityChecker(grid)": lambda value: GridValidityChecker(space_information(), value),
+    "GridMotionValidator(si)": lambda value: GridMotionValidator(value, GRID),
+    "GridMotionValidator(grid)": lambda value: GridMotionValidator(space_information(), value),
+    # Files.
+    "load_tasks(path)": lambda value: load_tasks(value, GRID),
+    "load_tasks(grid)": lambda value: load_tasks("/nonexistent/x.csv", value),
+    "tasks_of(path)": lambda value: tasks_of(value, GRID),
+    "save_figure(result)": lambda value: run_figure(result=value),
+    "save_figure(grid)": lambda value: run_figure(grid=value),
+    "save_figure(path)": lambda value: run_figure(path=value),
+    "load_model": load_model,
+    "Predictor.predict(grid)": lambda value: load_model().predict(value, START, GOAL),
+    "Predictor.predict(start)": lambda value: load_model().predict(GRID, value, GOAL),
+}
+
+
+@pytest.fixture(autouse=True)
+def quiet(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    ou.setLogLevel(ou.LOG_NONE)
+    monkeypatch.chdir(tmp_path)
+
+
+def outcome(call: Callable[[], object]) -> str:
+    """Return "worked" or the class of the error; any other exception fails the test."""
+    try:
+        call()
+    except CbaganOmplError as error:
+        assert 0 < len(str(error)) < 1000
+        return type(error).__name__
+    return "worked"
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_every_wrong_argument_is_named_or_works(name: str) -> None:
+    counts = Counter()
+    for label, value in POOL.items():
+        try:
+            counts[outcome(lambda value=value: CALLS[name](value))] += 1
+        except Exception as error:
+            raise AssertionError(f"{name} with {label}: {error!r}") from error
+    assert sum(counts.values()) == len(POOL)
+
+
+def test_the_table_covers_the_public_names() -> None:
+    assert len(CALLS) * len(POOL) >= 2500
+    callables = {name.partition("(")[0].partition(".")[0] for name in CALLS}
+    made_by_us = {"Attachment", "PlanResult", "Task"}
+    no_arguments = {"bundled_maps", "reached_planners"}
+    errors = {name for name in cbagan_ompl.__all__ if name.endswith("Error")}
+    assert set(cbagan_ompl.__all__) <= callables | made_by_us | no_arguments | errors
+
+
+def test_what_is_no_setup_is_said() -> None:
+    kinds = (None, 5, og.RRT(space_information()), space_information(), HEATMAP)
+    assert {outcome(lambda kind=kind: attach(kind, HEATMAP)) for kind in kinds} == {"PlannerError"}
+    assert outcome(lambda: attach(without_planner(), HEATMAP)) == "PlannerError"
+
+
+def test_random_arguments() -> None:
+    """Several wrong arguments at once."""
+    rng = np.random.default_rng(0)
+    values = list(POOL.values())
+
+    def pick(*names: str) -> dict[str, Any]:
+        chosen = rng.permutation(len(names))[: int(rng.integers(1, len(names) + 1))]
+        return {names[i]: values[int(rng.integers(len(values)))] for i in chosen}
+
+    options = ("uniform_fraction", "sharpness", "adaptation", "seed")
+    for _ in range(300):
+        for call, names in (
+            (SamplerOptions, options),
+            (run_attach, ("heatmap", "options", *options)),
+            (lambda **k: GridMap(**({"free": [[1]]} | k)), ("free", "resolution", "origin")),
+        ):
+            arguments = pick(*names)
+            outcome(lambda call=call, arguments=arguments: call(**arguments))
