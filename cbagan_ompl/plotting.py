@@ -26,7 +26,10 @@ from .common.figures import (
     mark_endpoints,
     write_figure,
 )
+from .common.files import as_path
 from .common.text import one_line
+from .errors import ConfigError, show
+from .maps.checks import check_grid
 from .maps.grid_map import GridMap
 
 if TYPE_CHECKING:

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..common.files import as_path
 from ..common.validation import require_torch, truth_value, whole_number
-from ..errors import MapError, ModelError, show
+from ..errors import ModelError, show
+from ..maps.checks import check_grid
 from ..maps.grid_map import GridMap
 from ..networks.config import MAX_IMAGE_SIZE
 from ..sampling.heatmap import Heatmap
@@ -133,11 +134,7 @@ class Predictor:
             TaskError: see :meth:`GridMap.check_task`.
             ConfigError: ``repair`` is no truth value.
         """
-        if not isinstance(grid, GridMap):
-            raise MapError(
-                f"predict takes a GridMap, got {show(grid)}; make one of an array, true where "
-                "free, with GridMap(array)"
-            )
+        check_grid(grid)
         repair = truth_value("repair", repair)
         endpoints = grid.to_pixel(grid.check_task(start, goal))
         shape = scaled_shape(grid.shape, int(self.record["working_size"]))

@@ -9,8 +9,9 @@ from importlib import resources
 from math import isfinite
 from pathlib import Path, PureWindowsPath
 
-from ..common.files import read_text
+from ..common.files import as_path, read_text
 from ..errors import MapError, show
+from .checks import check_grid
 from .grid_map import GridMap
 from .loading import BUNDLED, bundled_folder
 from .movingai import MAX_TASK_BYTES, MAX_TASKS, read_scenarios

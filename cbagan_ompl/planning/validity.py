@@ -6,8 +6,9 @@ from math import floor
 from typing import Any
 
 from ..errors import PlannerError
+from ..maps.checks import check_grid
 from ..maps.collision import segment_is_free
-from ..maps.grid_map import GridMap, check_grid
+from ..maps.grid_map import GridMap
 from .compat import ob
 from .states import StateAccess, space_of, state_access
 
@@ -27,7 +28,7 @@ class GridValidityChecker(ob.StateValidityChecker):  # type: ignore[misc]
 
     Example:
         >>> from ompl import base as ob
-        >>> from cbagan_ompl import GridMap, check_grid
+        >>> from cbagan_ompl import GridMap
         >>> space = ob.RealVectorStateSpace(2)
         >>> space.setBounds(0, 256)
         >>> si = ob.SpaceInformation(space)
@@ -72,7 +73,7 @@ class GridMotionValidator(ob.MotionValidator):  # type: ignore[misc]
 
     Example:
         >>> from ompl import base as ob
-        >>> from cbagan_ompl import GridMap, check_grid
+        >>> from cbagan_ompl import GridMap
         >>> space = ob.RealVectorStateSpace(2)
         >>> space.setBounds(0, 256)
         >>> si = ob.SpaceInformation(space)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..common.files import as_path
 from ..common.validation import random_generator, whole_number
 from ..errors import HeatmapError, show
+from ..maps.checks import check_grid
 from ..maps.connectivity import in_one_component, label_components
 from ..maps.endpoints import check_point
 from ..maps.grid_map import GridMap
@@ -282,14 +283,6 @@ def check_heatmap(heatmap: object) -> None:
         raise HeatmapError(
             f"expected a Heatmap, got {show(heatmap)}; an array of values becomes one with "
             "Heatmap(values, grid)"
-        )
-
-
-def _check_grid(grid: object) -> None:
-    if not isinstance(grid, GridMap):
-        raise HeatmapError(
-            f"a heat map lies on a GridMap, got {show(grid)}; an array of free pixels becomes one "
-            "with GridMap(free), a map file with GridMap.load(path)"
         )
 
 

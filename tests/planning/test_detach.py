@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import resource
 import threading
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -32,6 +33,19 @@ def quiet() -> None:
     ou.setLogLevel(ou.LOG_NONE)
 
 
+class SteppingValidator(ob.MotionValidator):  # type: ignore[misc]
+    """Asks a validity function about some points of each motion."""
+
+    def __init__(self, si: Any, is_valid: Callable[[Any], bool]) -> None:
+        super().__init__(si)
+        self._is_valid = is_valid
+
+    def checkMotion(self, s1: Any, s2: Any, *last_valid: Any) -> bool:  # noqa: N802
+        x, y = s1[0], s1[1]
+        ways = [(x + (s2[0] - x) * k / 12, y + (s2[1] - y) * k / 12) for k in range(1, 13)]
+        return all(self._is_valid(point) for point in ways)
+
+
 class DetachingChecker:
     """A validity function that detaches at its n-th call."""
 
@@ -41,7 +55,8 @@ class DetachingChecker:
         self._at = at
         si = setup.getSpaceInformation()
         setup.setStateValidityChecker(compat.validity_function(self.is_valid))
-        si.setMotionValidator(ob.DiscreteMotionValidator(si))
+        self._motions = SteppingValidator(si, self.is_valid)
+        si.setMotionValidator(self._motions)
 
     def is_valid(self, state: Any) -> bool:
         self.calls += 1
@@ -168,7 +183,9 @@ def test_threads_leave_the_log_level_alone() -> None:
     def work(seed: int) -> None:
         try:
             for i in range(6):
-                plan(GRID, SMALL_START, SMALL_GOAL, "RRT", "corridor", iterations=200, seed=seed + i)
+                plan(
+                    GRID, SMALL_START, SMALL_GOAL, "RRT", "corridor", iterations=200, seed=seed + i
+                )
         except BaseException as error:
             errors.append(error)
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from decimal import Decimal
-from fractions import Fraction
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from helpers.misuse import GOAL, GRID, HEATMAP, POOL, START
 
 import cbagan_ompl
 from cbagan_ompl import (
@@ -22,8 +22,8 @@ from cbagan_ompl import (
     Heatmap,
     HeatmapStateSampler,
     HeatmapValidStateSampler,
+    Predictor,
     SamplerOptions,
-    Task,
     attach,
     load_model,
     load_tasks,
@@ -33,95 +33,15 @@ from cbagan_ompl import (
     tasks_of,
     valid_state_sampler_allocator,
 )
+from cbagan_ompl.planning import compat
 from cbagan_ompl.planning.compat import og, ou
 from cbagan_ompl.planning.problem import make_setup
 from cbagan_ompl.sampling.sampler import HeatmapSampler
 
-GRID = GridMap(np.ones((24, 24), np.bool_), name="empty")
-START, GOAL = (2.5, 2.5), (20.5, 20.5)
-HEATMAP = Heatmap.uniform(GRID)
 
-
-class Hostile:
-    """Raises whatever it is asked."""
-
-    def __getattr__(self, name: str) -> Any:
-        raise RuntimeError(name)
-
-    def __float__(self) -> float:
-        raise RuntimeError("float")
-
-    def __index__(self) -> int:
-        raise RuntimeError("index")
-
-    def __array__(self, *_: Any, **__: Any) -> Any:
-        raise RuntimeError("array")
-
-    def __eq__(self, other: object) -> bool:
-        raise RuntimeError("eq")
-
-    __hash__ = None  # type: ignore[assignment]
-
-    def __repr__(self) -> str:
-        raise RuntimeError("repr")
-
-
-#: Values that are wrong in most places, by what they are called in the names of the tests.
-POOL: dict[str, Any] = {
-    "none": None,
-    "true": True,
-    "zero": 0,
-    "five": 5,
-    "minus": -1,
-    "huge": 10**400,
-    "longer": 10**5000,
-    "half": 1.5,
-    "tiny": 1e-300,
-    "large": 1e300,
-    "nan": float("nan"),
-    "inf": float("inf"),
-    "complex": 1 + 2j,
-    "decimal": Decimal("1.5"),
-    "fraction": Fraction(3, 2),
-    "decimal-nan": Decimal("nan"),
-    "text": "x",
-    "number-text": "1",
-    "empty-text": "",
-    "nul": "a\0b",
-    "surrogate": "\udc80",
-    "bytes": b"x",
-    "path": Path("/nonexistent/x.png"),
-    "folder": Path("/"),
-    "list": [],
-    "nested": [[[1]]],
-    "ragged": [[1, 2], [3]],
-    "dict": {"a": 1},
-    "set": {1},
-    "pair": (3.0, 3.0),
-    "triple": (1.0, 2.0, 3.0),
-    "ones": np.ones((24, 24)),
-    "bits": np.ones((24, 24), np.bool_),
-    "other-shape": np.ones((3, 5)),
-    "empty-array": np.empty((0, 2)),
-    "objects": np.array([[None, "x"]], dtype=object),
-    "object-zero": np.array(None, dtype=object),
-    "dates": np.array(["2020-01-01"], dtype="datetime64[D]"),
-    "records": np.zeros(3, dtype=[("a", "f8"), ("b", "i4")]),
-    "strings": np.array([["1", "2"]]),
-    "int8": np.int8(1),
-    "float16": np.float16(0.5),
-    "generator": np.random.default_rng(0),
-    "class": int,
-    "function": len,
-    "hostile": Hostile(),
-    "module": np,
-    "grid": GRID,
-    "heatmap": HEATMAP,
-    "options": SamplerOptions(),
-    "adaptation": Adaptation(),
-    "task": Task(START, GOAL),
-    "error": CbaganOmplError("x"),
-}
+@cache
+def model() -> Predictor:
+    return load_model()
 
 
 def fresh_setup() -> Any:
@@ -151,6 +71,27 @@ def space_information() -> Any:
 def run_figure(**changes: Any) -> None:
     save_figure(**({"result": run_plan(), "grid": GRID, "path": "/dev/null/x.png"} | changes))
 
+
+#: The sampler's options, and the arguments of plan but for its time.
+OPTIONS = ("uniform_fraction", "sharpness", "adaptation", "seed")
+PLAN_ARGUMENTS = (
+    "grid",
+    "start",
+    "goal",
+    "planner",
+    "sampler",
+    "iterations",
+    "range",
+    "radius",
+    "model",
+    "heatmap",
+    "simplify",
+    "goal_tolerance",
+    "keep_tree",
+    "options",
+    "unknown_keyword",
+    *OPTIONS,
+)
 
 #: Callables of the public API, by name, each with one argument that gets every value of the pool.
 CALLS: dict[str, Callable[[Any], object]] = {
@@ -195,30 +136,10 @@ CALLS: dict[str, Callable[[Any], object]] = {
     # Planning.
     **{
         f"plan({name})": lambda value, name=name: run_plan(**{name: value})
-        for name in (
-            "grid",
-            "start",
-            "goal",
-            "planner",
-            "sampler",
-            "iterations",
-            "range",
-            "radius",
-            "model",
-            "heatmap",
-            "simplify",
-            "goal_tolerance",
-            "keep_tree",
-            "options",
-            "uniform_fraction",
-            "sharpness",
-            "adaptation",
-            "seed",
-            "unknown_keyword",
-        )
-    },  # fmt: skip
+        for name in PLAN_ARGUMENTS
+    },
     "plan(time)": lambda value: run_plan(time=value, iterations=500),
-    "plan(own heatmap)": lambda value: run_plan(heatmap=value, sampler="learned"),
+    "plan(own heatmap)": lambda value: run_plan(heatmap=value, sampler="learned", iterations=200),
     "plan(own model)": lambda value: run_plan(model=value, sampler="learned"),
     "attach(setup)": lambda value: run_attach(value),
     "attach(heatmap)": lambda value: run_attach(heatmap=value),
@@ -247,8 +168,8 @@ CALLS: dict[str, Callable[[Any], object]] = {
     "save_figure(grid)": lambda value: run_figure(grid=value),
     "save_figure(path)": lambda value: run_figure(path=value),
     "load_model": load_model,
-    "Predictor.predict(grid)": lambda value: load_model().predict(value, START, GOAL),
-    "Predictor.predict(start)": lambda value: load_model().predict(GRID, value, GOAL),
+    "Predictor.predict(grid)": lambda value: model().predict(value, START, GOAL),
+    "Predictor.predict(start)": lambda value: model().predict(GRID, value, GOAL),
 }
 
 
@@ -263,9 +184,11 @@ def outcome(call: Callable[[], object]) -> str:
     try:
         call()
     except CbaganOmplError as error:
-        assert 0 < len(str(error)) < 1000
-        return type(error).__name__
-    return "worked"
+        said = error
+    else:
+        return "worked"
+    assert 0 < len(str(said)) < 1000
+    return type(said).__name__
 
 
 @pytest.mark.parametrize("name", CALLS)
@@ -294,21 +217,50 @@ def test_what_is_no_setup_is_said() -> None:
     assert outcome(lambda: attach(without_planner(), HEATMAP)) == "PlannerError"
 
 
-def test_random_arguments() -> None:
-    """Several wrong arguments at once."""
-    rng = np.random.default_rng(0)
+def run_state_sampler(**junk: Any) -> None:
+    space = fresh_setup().getStateSpace()
+    state = compat.new_state(space)
+    sampler = HeatmapStateSampler(**({"space": space, "heatmap": HEATMAP} | junk))
+    sampler.sampleUniform(compat.typed_state(state))
+
+
+def run_valid_state_sampler(**junk: Any) -> None:
+    HeatmapValidStateSampler(**({"si": space_information(), "heatmap": HEATMAP} | junk))
+
+
+#: Calls of the planning side, by name, with the arguments that get junk.
+FUZZED: dict[str, tuple[Callable[..., object], tuple[str, ...]]] = {
+    "options": (SamplerOptions, OPTIONS),
+    "attach": (run_attach, ("setup", "heatmap", "options", *OPTIONS)),
+    "plan": (run_plan, (*PLAN_ARGUMENTS, "sampler", "planner")),
+    "state sampler": (run_state_sampler, ("space", "heatmap", "options", *OPTIONS)),
+    "valid state sampler": (run_valid_state_sampler, ("si", "heatmap", "options", *OPTIONS)),
+}
+
+
+def fuzz(seed: int, count: int) -> Counter[tuple[str, str]]:
+    """Call each of :data:`FUZZED` with several wrong arguments at once; count the outcomes."""
+    rng = np.random.default_rng(seed)
     values = list(POOL.values())
+    counts: Counter[tuple[str, str]] = Counter()
+    for i in range(count):
+        name = list(FUZZED)[i % len(FUZZED)]
+        call, names = FUZZED[name]
+        chosen = rng.permutation(len(names))[: int(rng.integers(1, 4))]
+        junk = {names[j]: values[int(rng.integers(len(values)))] for j in chosen}
+        try:
+            counts[name, outcome(lambda call=call, junk=junk: call(**junk))] += 1
+        except Exception as error:
+            raise AssertionError(f"{name} with {sorted(junk)}, call {i}: {error!r}") from error
+    return counts
 
-    def pick(*names: str) -> dict[str, Any]:
-        chosen = rng.permutation(len(names))[: int(rng.integers(1, len(names) + 1))]
-        return {names[i]: values[int(rng.integers(len(values)))] for i in chosen}
 
-    options = ("uniform_fraction", "sharpness", "adaptation", "seed")
-    for _ in range(300):
-        for call, names in (
-            (SamplerOptions, options),
-            (run_attach, ("heatmap", "options", *options)),
-            (lambda **k: GridMap(**({"free": [[1]]} | k)), ("free", "resolution", "origin")),
-        ):
-            arguments = pick(*names)
-            outcome(lambda call=call, arguments=arguments: call(**arguments))
+@pytest.mark.parametrize(
+    ("seed", "count"), [(0, 250), pytest.param(1, 2000, marks=pytest.mark.slow)]
+)
+def test_several_wrong_arguments_at_once(seed: int, count: int) -> None:
+    counts = fuzz(seed, count)
+    assert sum(counts.values()) == count
+    assert {name for name, _ in counts} == set(FUZZED)
+    refused = sum(n for (_, kind), n in counts.items() if kind != "worked")
+    assert count / 2 < refused < count
