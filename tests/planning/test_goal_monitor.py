@@ -45,7 +45,7 @@ def prepare(attached: str, state: str) -> tuple[Any, Any]:
     setup = small_setup(GRID, attached)
     attachment = attach(setup, HEATMAP, seed=3)
     if state == "solved":
-        solve_for(setup, 2000)
+        solve_for(setup, 2000 if attached == "RRT" else 300)
         assert setup.haveExactSolutionPath()
         setup.getProblemDefinition().clearSolutionPaths()
     elif state != "new":
