@@ -26,6 +26,10 @@ _NO_PARAMETERS = frozenset(
 # How near to the shortest cost the search for a shorter path ends, relative.
 _OPTIMUM_SLACK = 1e-6
 
+# Paths this short, as a fraction of the distance of start and goal, are not made shorter: they are
+# found where the start is in the goal region already, or nearly.
+_NEGLIGIBLE_FRACTION = 1e-2
+
 # Slack of the check that a path ends in the goal region, for the rounding of a distance.
 _ROUNDING = 1e-9
 
@@ -71,15 +75,19 @@ def stop_at_optimum(setup: Any, endpoints: Endpoints, tolerance: float) -> None:
     """Let planners of a setup end once no path can be shorter, by a millionth.
 
     SORRT* needs it. It makes samples that may shorten its path until it has a batch of them, and
-    where the path is the straight line there are none: its solve would never return.
+    where the path is the straight line there are none: its solve would never return. Where the
+    start is nearly in the goal region there are few, and it would go on far beyond its time.
 
     Args:
         setup: whose planner has been set up, and has set the objective.
         endpoints: start and goal.
         tolerance: how far from the goal a path may end, world units.
     """
-    shortest = max(float(np.hypot(*(endpoints[1] - endpoints[0]))) - tolerance, 0.0)
-    _set_cost_threshold(setup, shortest * (1 + _OPTIMUM_SLACK))
+    distance = float(np.hypot(*(endpoints[1] - endpoints[0])))
+    shortest = max(distance - tolerance, 0.0)
+    _set_cost_threshold(
+        setup, max(shortest * (1 + _OPTIMUM_SLACK), distance * _NEGLIGIBLE_FRACTION)
+    )
 
 
 def search_to_the_end(setup: Any) -> None:
@@ -138,3 +146,25 @@ def checked_path(
 def path_length(path: NDArray[np.float64]) -> float:
     """Return the length of a path, (N, 2), world units."""
     return float(np.hypot(*np.diff(path, axis=0).T).sum())
+
+
+def follow_path(path: NDArray[np.float64], step: float) -> NDArray[np.float64]:
+    """Return points along a path, the way points among them.
+
+    Args:
+        path: way points, (N, 2), world.
+        step: the longest distance between two points, world units.
+
+    Returns:
+        (M, 2), world; each segment is divided into equal steps.
+
+    Example:
+        >>> follow_path(np.array([[0.0, 0.0], [0.0, 1.0]]), 0.5).tolist()
+        [[0.0, 0.0], [0.0, 0.5], [0.0, 1.0]]
+    """
+    counts = np.ceil(np.hypot(*np.diff(path, axis=0).T) / step).astype(int).clip(1)
+    pieces = [
+        np.linspace(start, end, count, endpoint=False)
+        for start, end, count in zip(path[:-1], path[1:], counts.tolist(), strict=True)
+    ]
+    return np.vstack((*pieces, path[-1:]))

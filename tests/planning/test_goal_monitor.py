@@ -166,14 +166,16 @@ def test_a_planner_that_ompl_has_chosen_is_reached() -> None:
 FREE_LINE = """
 import numpy as np
 import cbagan_ompl
-from cbagan_ompl.planning.compat import og
 grid = cbagan_ompl.GridMap(np.ones((64, 64), bool))
-for seed in range(3):
-    for sampler in ("uniform", "straight-line"):
-        for tolerance in (0, 1e-6, None):
+pocket = np.zeros((64, 64))
+pocket[:3, :3] = 1  # nothing of it in the informed set
+ways = [{"sampler": name} for name in ("uniform", "straight-line", "corridor", "learned")]
+for seed in range(1):
+    for way in [*ways, {"heatmap": pocket}]:
+        for tolerance in (0, 1e-6, None, 60):  # with the last the start is in the goal region
             result = cbagan_ompl.plan(
-                grid, (5.5, 5.5), (50.2, 40.3), "SORRTstar", sampler, time=0.1, seed=seed,
-                goal_tolerance=tolerance,
+                grid, (5.5, 5.5), (50.2, 40.3), "SORRTstar", time=0.1, seed=seed,
+                goal_tolerance=tolerance, **way
             )
             assert result.solved and result.cost < 1.01 * np.hypot(44.7, 34.8), result
 print("done")
@@ -182,13 +184,16 @@ print("done")
 BENCHMARK_OF_FREE_LINE = """
 import numpy as np
 import cbagan_ompl
+from cbagan_ompl import Heatmap
 from cbagan_ompl.planning.ompl_benchmark import PlannerVariant, RunOptions, run_benchmark
 grid = cbagan_ompl.GridMap(np.ones((64, 64), bool))
 variants = [PlannerVariant(p, "uniform", None) for p in ("SORRTstar", "RRTstar")]
+variants += [PlannerVariant("SORRTstar", "corridor", Heatmap.corridor)]
 ends = grid.check_task((5.5, 5.5), (50.2, 40.3))
 recording = run_benchmark("x", grid, ends, variants, RunOptions(2, 0.2))
 costs = {name: [run.cost for run in runs] for name, runs in recording.runs.items()}
-assert max(costs["SORRTstar_uniform"]) < 1.01 * np.hypot(44.7, 34.8), costs
+for sampler in ("uniform", "corridor"):
+    assert max(costs["SORRTstar_" + sampler]) < 1.01 * np.hypot(44.7, 34.8), costs
 print("done")
 """
 

@@ -23,6 +23,7 @@ from cbagan_ompl import (
     HeatmapStateSampler,
     HeatmapValidStateSampler,
     Predictor,
+    Robot,
     SamplerOptions,
     attach,
     load_model,
@@ -75,6 +76,7 @@ def run_figure(**changes: Any) -> None:
 #: The sampler's options, and the arguments of plan but for its time.
 OPTIONS = ("uniform_fraction", "sharpness", "adaptation", "seed")
 PLAN_ARGUMENTS = (
+    "snap",
     "grid",
     "start",
     "goal",
@@ -160,6 +162,13 @@ CALLS: dict[str, Callable[[Any], object]] = {
     "GridValidityChecker(grid)": lambda value: GridValidityChecker(space_information(), value),
     "GridMotionValidator(si)": lambda value: GridMotionValidator(value, GRID),
     "GridMotionValidator(grid)": lambda value: GridMotionValidator(space_information(), value),
+    # Robots.
+    "Robot.disc": Robot.disc,
+    "Robot.rectangle(length)": lambda value: Robot.rectangle(value, 1.0),
+    "Robot.rectangle(width)": lambda value: Robot.rectangle(1.0, value),
+    "Robot.rectangle(turning_radius)": lambda value: Robot.rectangle(1.0, 1.0, value),
+    "Robot.rectangle(reverse)": lambda value: Robot.rectangle(1.0, 1.0, reverse=value),
+    "Robot.polygon(vertices)": Robot.polygon,
     # Files.
     "load_tasks(path)": lambda value: load_tasks(value, GRID),
     "load_tasks(grid)": lambda value: load_tasks("/nonexistent/x.csv", value),
@@ -169,6 +178,7 @@ CALLS: dict[str, Callable[[Any], object]] = {
     "save_figure(path)": lambda value: run_figure(path=value),
     "load_model": load_model,
     "Predictor.predict(grid)": lambda value: model().predict(value, START, GOAL),
+    "Predictor.predict_many(starts)": lambda value: model().predict_many(GRID, value, [GOAL]),
     "Predictor.predict(start)": lambda value: model().predict(GRID, value, GOAL),
 }
 
