@@ -26,7 +26,10 @@ from .common.figures import (
     mark_endpoints,
     write_figure,
 )
+from .common.files import as_path
 from .common.text import one_line
+from .errors import ConfigError, show
+from .maps.checks import check_grid
 from .maps.grid_map import GridMap
 
 if TYPE_CHECKING:
@@ -77,7 +80,12 @@ def save_figure(
         >>> with tempfile.NamedTemporaryFile(suffix=".png") as file:
         ...     save_figure(result, grid, file.name)
     """
-    check_figure_path(path)
+    from .planning.plan_result import PlanResult
+
+    if not isinstance(result, PlanResult):
+        raise ConfigError(f"save_figure draws the result of plan, got {show(result)}")
+    check_grid(grid)
+    check_figure_path(as_path(path, ConfigError))
     write_figure(make_figure(result, grid, show_tree=show_tree), path)
 
 

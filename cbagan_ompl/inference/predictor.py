@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..common.validation import require_torch, truth_value, whole_number
-from ..errors import MapError, ModelError, TaskError, show
+from ..errors import ModelError, TaskError, show
+from ..maps.checks import check_grid
 from ..maps.grid_map import GridMap
 from ..networks.config import MAX_IMAGE_SIZE
 from ..sampling.heatmap import Heatmap
@@ -187,11 +188,7 @@ class Predictor:
         self, grid: GridMap, starts: list[ArrayLike], goals: list[ArrayLike], repair: bool
     ) -> list[Heatmap]:
         """Predict for tasks on one map, in one pass of the network."""
-        if not isinstance(grid, GridMap):
-            raise MapError(
-                f"predict takes a GridMap, got {show(grid)}; make one of an array, true where "
-                "free, with GridMap(array)"
-            )
+        check_grid(grid)
         repair = truth_value("repair", repair)
         tasks = [grid.check_task(*task) for task in zip(starts, goals, strict=True)]
         shape = scaled_shape(grid.shape, int(self.record["working_size"]))

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..common.files import read_bytes
+from ..common.files import as_path, read_bytes
 from ..errors import ConfigError, MapError, show
 from .image_files import MAX_IMAGE_BYTES, SUFFIXES, decode_image
 from .movingai import read_movingai_map
@@ -71,10 +71,10 @@ def read_map(path: str | os.PathLike[str], **options: Any) -> RawMap:
         if option not in known:
             raise ConfigError(f"unknown map option {show(option)}; known are {', '.join(known)}")
     settings = MapOptions(**options)
+    file = as_path(path, MapError)
     if str(path).startswith(BUNDLED):
         return _read_bundled(str(path).removeprefix(BUNDLED), settings)
 
-    file = Path(path)
     suffix = file.suffix.lower()
     if suffix in SUFFIXES:
         return _read_image_map(

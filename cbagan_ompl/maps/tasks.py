@@ -9,8 +9,9 @@ from importlib import resources
 from math import isfinite
 from pathlib import Path, PureWindowsPath
 
-from ..common.files import read_text
+from ..common.files import as_path, read_text
 from ..errors import MapError, show
+from .checks import check_grid
 from .grid_map import GridMap
 from .loading import BUNDLED, bundled_folder
 from .movingai import MAX_TASK_BYTES, MAX_TASKS, read_scenarios
@@ -75,7 +76,8 @@ def load_tasks(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
         >>> tasks[0].goal
         (3.0, 4.0)
     """
-    file = Path(path)
+    check_grid(grid)
+    file = as_path(path, MapError)
     suffix = file.suffix.lower()
     if suffix == ".scen":
         return _scen_tasks(file, grid)
@@ -105,10 +107,11 @@ def tasks_of(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
         >>> len(tasks_of("bundled:maze", GridMap.load("bundled:maze")))
         4
     """
+    check_grid(grid)
+    file = as_path(path, MapError)
     if str(path).startswith(BUNDLED):
-        with resources.as_file(bundled_folder() / "tasks.csv") as file:
-            return load_tasks(file, grid)
-    file = Path(path)
+        with resources.as_file(bundled_folder() / "tasks.csv") as tasks:
+            return load_tasks(tasks, grid)
     if file.suffix.lower() == ".map":
         for beside in (Path(f"{file}.scen"), file.with_suffix(".scen")):
             if os.path.isfile(beside):  # False also where the name is too long to be one

@@ -61,9 +61,16 @@ class Attachment:
     """
 
     def __init__(
-        self, hook: str, sampler: HeatmapSampler, monitor: PlannerMonitor, undo: Callable[[], None]
+        self,
+        hook: str,
+        sampler: HeatmapSampler,
+        monitor: PlannerMonitor,
+        goal: Any,
+        undo: Callable[[], None],
     ) -> None:
         self.hook = hook
+        # Kept, because whoever plans to it does not keep it.
+        self._goal = goal
         self._sampler = sampler
         self._monitor = monitor
         self._undo: Callable[[], None] | None = undo
@@ -81,7 +88,8 @@ class Attachment:
 
         Raises:
             PlannerError: the planner is in the middle of a solve, from one of whose callbacks this
-                is called: it would go on in a tree that is no more.
+                is called: it would go on in a tree that is no more. That is known of the setup's
+                ``solve``, and of any other once it has asked for a sample.
         """
         if self._undo is not None and self._monitor.is_planning(sys._getframe(1)):
             raise PlannerError(
@@ -124,7 +132,8 @@ def attach(
     the attached one get the goal itself, also while it is attached. Until
     :meth:`Attachment.detach` the setup, the planner and the heat map keep each other alive; where
     nothing else refers to them any more, they are let go by the next ``attach`` or by Python's
-    garbage collector.
+    garbage collector. That does not see references through OMPL: if a validity checker refers to
+    its own setup, or an attribute of the setup to the attachment, only ``detach`` lets go of them.
 
     Args:
         setup: an ``ompl.geometric.SimpleSetup``.
@@ -194,10 +203,13 @@ def attach(
 
     def undo() -> None:
         monitor.release()
-        planner.clear()  # first: a planner without samplers makes none while its options change
+        # First: a planner without samplers makes none while its options change. One without a tree
+        # has none; it may be looking at its start, at the beginning of a solve that is not watched.
+        if compat.planner_data(planner).numVertices() > 0:
+            planner.clear()
         undo_hook()
 
-    return Attachment(hook, sampler, monitor, undo)
+    return Attachment(hook, sampler, monitor, setup.getGoal(), undo)
 
 
 def _planner_of(setup: Any) -> Any:

@@ -123,8 +123,8 @@ def plan(
     source = grid if isinstance(grid, GridMap) else GridMap.load(grid)
     workspace = Workspace(source, _robot_of(robot, radius))
     moves: Moves = {}
-    if snap != 0:
-        distance = finite_number("snap", snap, 0.0)
+    distance = finite_number("snap", snap, 0.0)
+    if distance > 0:
         (start, goal), moves = workspace.snap(start, goal, distance)
     endpoints = workspace.check_task(start, goal)
     tolerance = source.resolution
@@ -132,7 +132,8 @@ def plan(
         tolerance = finite_number("goal_tolerance", goal_tolerance, 0.0)
     options, seed = _with_seed(SamplerOptions.of(options, changes))
     planner = planner_name(planner)
-    check_planner(planner, follows_heatmap=sampler != UNIFORM)
+    is_plain = isinstance(sampler, str) and sampler == UNIFORM
+    check_planner(planner, follows_heatmap=not is_plain)
     name, make_heatmap = heatmap_source(sampler, model, heatmap)
     job = _Job(
         map_name=source.name,

@@ -20,6 +20,10 @@ _NO_PARAMETERS = frozenset(
 # How near to the shortest cost the search for a shorter path ends, relative.
 _OPTIMUM_SLACK = 1e-6
 
+# Paths this short, as a fraction of the distance of start and goal, are not made shorter: they are
+# found where the start is in the goal region already, or nearly.
+_NEGLIGIBLE_FRACTION = 1e-2
+
 
 def make_setup(workspace: Workspace, endpoints: Endpoints, tolerance: float) -> Any:
     """Return a SimpleSetup with exact checks, start and goal, but no planner.
@@ -61,15 +65,19 @@ def stop_at_optimum(setup: Any, endpoints: Endpoints, tolerance: float) -> None:
     """Let planners of a setup end once no path can be shorter, by a millionth.
 
     SORRT* needs it. It makes samples that may shorten its path until it has a batch of them, and
-    where the path is the straight line there are none: its solve would never return.
+    where the path is the straight line there are none: its solve would never return. Where the
+    start is nearly in the goal region there are few, and it would go on far beyond its time.
 
     Args:
         setup: whose planner has been set up, and has set the objective.
         endpoints: start and goal.
         tolerance: how far from the goal a path may end, world units.
     """
-    shortest = max(float(np.hypot(*(endpoints[1] - endpoints[0])[:2])) - tolerance, 0.0)
-    _set_cost_threshold(setup, shortest * (1 + _OPTIMUM_SLACK))
+    distance = float(np.hypot(*(endpoints[1] - endpoints[0])[:2]))
+    shortest = max(distance - tolerance, 0.0)
+    _set_cost_threshold(
+        setup, max(shortest * (1 + _OPTIMUM_SLACK), distance * _NEGLIGIBLE_FRACTION)
+    )
 
 
 def search_to_the_end(setup: Any) -> None:
