@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..common.files import as_path
+from ..common.memory import is_out_of_memory, translate_lack_of_memory
 from ..common.validation import require_torch, truth_value, whole_number
 from ..errors import MapError, ModelError, show
 from ..maps.grid_map import GridMap
@@ -58,8 +59,12 @@ def load_model(path: str | PathLike[str] | None = None) -> Predictor:
         predictor = Predictor(load_script(model.script), model.record)
         predictor.warm_up()
     except ModelError as error:
-        raise ModelError(f"{source}: {error}; copy or export it again") from error
+        is_damaged = error.__cause__ is None or not is_out_of_memory(error.__cause__)
+        hint = "; copy or export it again" if is_damaged else ""
+        raise ModelError(f"{source}: {error}{hint}") from error
     except Exception as error:  # torch raises many types for damaged archives
+        if is_out_of_memory(error):
+            raise ModelError(f"{source}: not enough memory to load the model") from error
         raise ModelError(
             f"{source}: torch cannot load the model ({type(error).__name__}), the file is "
             "probably damaged; copy or export it again"
@@ -159,6 +164,9 @@ class Predictor:
 
         Returns:
             (B, H, W), the probability that a pixel belongs to the region.
+
+        Raises:
+            ModelError: there is not enough memory.
         """
         import torch
         from torch.jit import optimized_execution  # type: ignore[attr-defined]
@@ -169,7 +177,15 @@ class Predictor:
         torch.set_num_threads(self.inference_threads)
         try:
             # Without the optimiser, whose first two calls take ten times as long: a plan makes one.
-            with torch.inference_mode(), optimized_execution(False):
+            with (
+                translate_lack_of_memory(
+                    ModelError,
+                    f"to predict for cells of shape {tuple(cells.shape)}",
+                    "give it fewer at a time, or take a model with a smaller working size",
+                ),
+                torch.inference_mode(),
+                optimized_execution(False),
+            ):
                 values = self._module(cells, *endpoints)
         finally:
             torch.set_num_threads(threads)

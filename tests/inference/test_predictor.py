@@ -9,7 +9,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from cbagan_ompl import GridMap, Heatmap, MissingDependencyError, TaskError
+from cbagan_ompl import GridMap, Heatmap, MissingDependencyError, ModelError, TaskError
 from cbagan_ompl.inference.predictor import Predictor, load_model, scaled_free, scaled_shape
 
 
@@ -88,6 +88,14 @@ def test_small_maps_are_enlarged() -> None:
     free = np.array([[True, False], [False, True]])
     enlarged = scaled_free(free, (4, 6))
     assert np.array_equal(enlarged, free.repeat(2, axis=0).repeat(3, axis=1))
+
+
+def test_lack_of_memory_is_said() -> None:
+    def greedy(free: torch.Tensor, start: torch.Tensor, goal: torch.Tensor) -> torch.Tensor:
+        return torch.empty(2**50)
+
+    with pytest.raises(ModelError, match=r"not enough memory .*\(1, 1, 64, 64\): give it fewer"):
+        Predictor(greedy, {"working_size": 64}).predict(GridMap(np.ones((64, 64))), (1, 1), (9, 9))
 
 
 def test_the_package_does_not_import_torch() -> None:
