@@ -11,6 +11,7 @@ from ..maps.grid_map import GridMap
 from ..maps.loading import bundled_maps
 from ..maps.tasks import tasks_of
 from ..sampling.heatmap import Heatmap
+from .inputs import input_files
 from .options import (
     add_map_options,
     add_sampler_options,
@@ -134,7 +135,7 @@ def _plan(args: argparse.Namespace) -> int:
 
         check_figure_path(args.output)
     for file in (args.output, args.csv):
-        check_output(file, [args.map, args.heatmap or ""], force=args.force)
+        check_output(file, input_files(args), force=args.force)
     grid = GridMap.load(args.map, **map_options(args))
     start, goal = _endpoints(args, grid)
     result = plan(

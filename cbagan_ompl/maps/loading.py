@@ -7,6 +7,7 @@ map.
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from importlib import resources
 from pathlib import Path
@@ -19,13 +20,15 @@ from ..errors import ConfigError, MapError, show
 from .image_files import MAX_IMAGE_BYTES, SUFFIXES, decode_image
 from .movingai import read_movingai_map
 from .raw_map import RawMap
-from .ros import read_ros_map
+from .ros import image_of_ros_map, read_ros_map
 
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
 
 #: What a path to a map that comes with the package begins with.
 BUNDLED = "bundled:"
+
+_YAML_SUFFIXES = (".yaml", ".yml")
 
 
 @dataclass(frozen=True)
@@ -80,7 +83,7 @@ def read_map(path: str | os.PathLike[str], **options: Any) -> RawMap:
         return _read_image_map(
             read_bytes(file, limit=MAX_IMAGE_BYTES), str(file), file.stem, settings
         )
-    if suffix in (".yaml", ".yml"):
+    if suffix in _YAML_SUFFIXES:
         return read_ros_map(file, unknown_is_free=settings.unknown_is_free)
     if suffix == ".map":
         return read_movingai_map(file)
@@ -88,6 +91,25 @@ def read_map(path: str | os.PathLike[str], **options: Any) -> RawMap:
         f"{file}: unknown kind of map file; known are {', '.join(SUFFIXES)} (images), .yaml and "
         f".yml (ROS map_server), .map (MovingAI) and {BUNDLED}NAME"
     )
+
+
+def map_files(path: str | os.PathLike[str]) -> list[Path]:
+    """Return the files that a map is read from: the one that is given, and what it names.
+
+    Args:
+        path: a file for :func:`read_map`; none for ``bundled:NAME``.
+
+    Example:
+        >>> map_files("bundled:maze"), [file.name for file in map_files("maps/hall.png")]
+        ([], ['hall.png'])
+    """
+    if str(path).startswith(BUNDLED):
+        return []
+    file = Path(path)
+    if file.suffix.lower() in _YAML_SUFFIXES:
+        with suppress(MapError):  # raised again when it is read
+            return [file, image_of_ros_map(file)]
+    return [file]
 
 
 def bundled_maps() -> tuple[str, ...]:

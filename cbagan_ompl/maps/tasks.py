@@ -112,10 +112,21 @@ def tasks_of(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
     if str(path).startswith(BUNDLED):
         with resources.as_file(bundled_folder() / "tasks.csv") as tasks:
             return load_tasks(tasks, grid)
+    files = task_files(file)
+    return load_tasks(files[0], grid) if files else []
+
+
+def task_files(path: str | os.PathLike[str]) -> list[Path]:
+    """Return the file of the tasks that lies beside a MovingAI map, in a list; none for others.
+
+    Args:
+        path: of the map.
+    """
+    file = Path(path)
     if file.suffix.lower() == ".map":
         for beside in (Path(f"{file}.scen"), file.with_suffix(".scen")):
             if os.path.isfile(beside):  # False also where the name is too long to be one
-                return load_tasks(beside, grid)
+                return [beside]
     return []
 
 

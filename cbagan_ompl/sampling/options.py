@@ -118,14 +118,14 @@ class HeadingSpread:
         spread, uniform, reverse = map(to_float, given)
         if not 0 < spread <= pi:
             raise ConfigError(
-                f"the spread of headings is a number of radians above 0, at most pi, got "
+                "the spread of headings is a number of radians above 0, at most pi, got "
                 f"{show(self.spread)}"
             )
         if not LEAST_UNIFORM_FRACTION <= uniform <= 1:
             raise ConfigError(
                 "the uniform_fraction of headings is a fraction from "
-                f"{LEAST_UNIFORM_FRACTION:g} to 1, got {show(self.uniform_fraction)}; it cannot be 0, because "
-                "the planner would lose probabilistic completeness"
+                f"{LEAST_UNIFORM_FRACTION:g} to 1, got {show(self.uniform_fraction)}; it cannot be "
+                "0, because the planner would lose probabilistic completeness"
             )
         if not 0 <= reverse <= 1:
             raise ConfigError(

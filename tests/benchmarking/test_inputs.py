@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.fuzzing import mutations, read_all
 
 from cbagan_ompl import ConfigError, GridMap, Task, __version__
 from cbagan_ompl.benchmarking.benchmark import Benchmark
@@ -97,3 +98,17 @@ def test_large_records_are_refused(tmp_path: Path) -> None:
     path.write_bytes(b" " * (2**24 + 1))
     with pytest.raises(ConfigError, match="more than the 16 MiB"):
         read_record(path)
+
+
+def test_damaged_records_are_read_or_refused(two_walls: GridMap, tmp_path: Path) -> None:
+    settings = Settings(("RRT", "RRTstar"), ("uniform",), parameters={"RRTstar": {"goal_bias": 0}})
+    record = record_inputs([BenchmarkTask(two_walls, 0, Task(START, GOAL))], settings)
+    path = tmp_path / "settings.json"
+
+    def read(data: bytes) -> None:
+        path.write_bytes(data)
+        check_same(record, path)
+
+    counts = read_all(read, mutations([json.dumps(record, indent=2).encode()], 600, seed=0))
+    assert counts["read"] > 3
+    assert counts["refused"] > 500
