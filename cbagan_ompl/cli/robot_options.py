@@ -6,6 +6,7 @@ import argparse
 from typing import Any
 
 from ..errors import ConfigError
+from ..robots.footprint_files import parse_footprint
 from ..robots.robot import Robot
 
 
@@ -44,8 +45,6 @@ def robot_of(args: argparse.Namespace) -> Robot:
     if args.footprint is not None:
         if args.radius is not None:
             raise ConfigError("give --radius for a disc or --footprint for another shape, not both")
-        from ..robots.footprint_files import parse_footprint
-
         return parse_footprint(args.footprint, **turning)
     if args.radius:
         return Robot.disc(args.radius, **turning)
