@@ -72,7 +72,15 @@ def add_train_parser(subparsers: Any) -> None:
         metavar="FILE",
         help="begin with the weights of another run's checkpoint, which this one refines",
     )
-    recipe = parser.add_argument_group("recipe, the later overrides the earlier")
+    _add_recipe_options(parser.add_argument_group("recipe, the later overrides the earlier"))
+    _add_machine_options(parser.add_argument_group("machine"))
+    parser.add_argument(
+        "--tensorboard", action="store_true", help="write logs for TensorBoard into the folder"
+    )
+    parser.add_argument("--json", metavar="FILE", help="write the scores as JSON")
+
+
+def _add_recipe_options(recipe: Any) -> None:
     recipe.add_argument(
         "--preset",
         choices=sorted(PRESETS),
@@ -106,11 +114,6 @@ def add_train_parser(subparsers: Any) -> None:
         help="train the generator alone, without discriminators; the same as --set "
         "adversarial_weight=0",
     )
-    _add_machine_options(parser.add_argument_group("machine"))
-    parser.add_argument(
-        "--tensorboard", action="store_true", help="write logs for TensorBoard into the folder"
-    )
-    parser.add_argument("--json", metavar="FILE", help="write the scores as JSON")
 
 
 def _add_machine_options(group: Any) -> None:

@@ -102,7 +102,7 @@ def test_large_records_are_refused(tmp_path: Path) -> None:
 
 def test_damaged_records_are_read_or_refused(two_walls: GridMap, tmp_path: Path) -> None:
     settings = Settings(("RRT", "RRTstar"), ("uniform",), parameters={"RRTstar": {"goal_bias": 0}})
-    record = record_inputs([BenchmarkTask(two_walls, 0, Task(START, GOAL))], settings)
+    record = record_inputs([BenchmarkTask(Workspace(two_walls), 0, Task(START, GOAL))], settings)
     path = tmp_path / "settings.json"
 
     def read(data: bytes) -> None:
