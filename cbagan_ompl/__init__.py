@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from .errors import (
     CbaganOmplError,
+    CbaganOmplWarning,
     ConfigError,
     DatasetError,
     HeatmapError,
@@ -51,6 +52,7 @@ __all__ = [
     "Adaptation",
     "Attachment",
     "CbaganOmplError",
+    "CbaganOmplWarning",
     "ConfigError",
     "DatasetError",
     "GridMap",
