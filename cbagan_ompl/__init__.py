@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     )
     from .planning.plan import plan
     from .planning.plan_result import PlanResult
+    from .planning.replanner import Replanner
     from .planning.validity import GridMotionValidator, GridValidityChecker
     from .plotting import save_figure
     from .robots.robot import Robot
@@ -70,6 +71,7 @@ __all__ = [
     "PlanResult",
     "PlannerError",
     "Predictor",
+    "Replanner",
     "Robot",
     "RobotError",
     "SamplerOptions",
@@ -96,6 +98,7 @@ _HOMES = {
     "planning.hooks": ("reached_planners",),
     "planning.plan": ("plan",),
     "planning.plan_result": ("PlanResult",),
+    "planning.replanner": ("Replanner",),
     "planning.ompl_samplers": (
         "HeatmapStateSampler",
         "HeatmapValidStateSampler",

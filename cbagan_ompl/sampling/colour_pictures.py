@@ -1,6 +1,7 @@
 """Regions that are drawn in colour, as in the published (map, point, ROI) data sets.
 
-There the region is green on white, often with obstacles in black and marks at start and goal. Read as gray levels such a picture is the wrong way round: green is darker than white.
+There the region is green on white, often with obstacles in black and marks at start and goal. Read
+as gray levels such a picture is the wrong way round: green is darker than white.
 """
 
 from __future__ import annotations

@@ -105,9 +105,7 @@ def half(colour: tuple[int, int, int], other: tuple[int, int, int], grid: GridMa
 def test_other_colours_are_refused(grid: GridMap, tmp_path: Path, make: object) -> None:
     path = tmp_path / "heat.png"
     cv2.imwrite(str(path), make(grid))  # type: ignore[operator]
-    with pytest.raises(
-        HeatmapError, match=r"heat.png: a heat map is a gray image, .* green region"
-    ):
+    with pytest.raises(HeatmapError, match=r"heat.png: a heat map is a gray image, .* green"):
         Heatmap.load(path, grid)
 
 
