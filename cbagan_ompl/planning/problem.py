@@ -154,9 +154,10 @@ def follow_path(path: NDArray[np.float64], step: float) -> NDArray[np.float64]:
         >>> follow_path(np.array([[0.0, 0.0], [0.0, 1.0]]), 0.5).tolist()
         [[0.0, 0.0], [0.0, 0.5], [0.0, 1.0]]
     """
-    counts = np.ceil(np.hypot(*np.diff(path, axis=0).T) / step).astype(int).clip(1)
-    pieces = [
-        np.linspace(start, end, count, endpoint=False)
-        for start, end, count in zip(path[:-1], path[1:], counts.tolist(), strict=True)
-    ]
-    return np.vstack((*pieces, path[-1:]))
+    moves = np.diff(path, axis=0)
+    counts = np.ceil(np.hypot(*moves.T) / step).astype(int).clip(1)
+    # Of each point: its segment, and which step of it.
+    segments = np.repeat(np.arange(len(counts)), counts)
+    steps = np.arange(len(segments)) - np.repeat(counts.cumsum() - counts, counts)
+    fractions = (steps / counts[segments])[:, None]
+    return np.vstack((path[segments] + fractions * moves[segments], path[-1:]))

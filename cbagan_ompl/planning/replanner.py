@@ -115,7 +115,9 @@ class Replanner:
             return False
         grid = self.grid.inflated(self._options.get("radius", 0.0))
         before = self.heatmap.grid
-        if _frame(grid) != _frame(before) or (self.heatmap.region & ~grid.free).any():
+        if grid is not before and (
+            _frame(grid) != _frame(before) or (self.heatmap.region & ~grid.free).any()
+        ):
             return False
         return self.heatmap.connects(start, self._last.goal)
 
