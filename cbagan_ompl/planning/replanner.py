@@ -6,6 +6,7 @@ from dataclasses import replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from ..common.validation import whole_number
@@ -15,6 +16,7 @@ from ..sampling.heatmap import Heatmap
 from .heatmap_sources import LEARNED, heatmap_source, loaded_model
 from .plan import plan
 from .plan_result import PlanResult
+from .workspace import Workspace
 
 if TYPE_CHECKING:
     from ..inference.predictor import Predictor
@@ -85,7 +87,7 @@ class Replanner:
         """Plan from a start to the goal.
 
         Args:
-            start: (x, y), world: where the robot is.
+            start: (x, y), world, or (x, y, yaw) for a robot with heading: where the robot is.
             grid: the map from now on, where it has changed.
 
         Returns:
@@ -113,13 +115,19 @@ class Replanner:
         """Return whether the heat map is worth to be sampled from another start."""
         if self.heatmap is None or self._last is None:
             return False
-        grid = self.grid.inflated(self._options.get("radius", 0.0))
+        grid = Workspace(self.grid, self._last.robot).grid
         before = self.heatmap.grid
         if grid is not before and (
             _frame(grid) != _frame(before) or (self.heatmap.region & ~grid.free).any()
         ):
             return False
-        return self.heatmap.connects(start, self._last.goal)
+        # Of a pose the position counts; what is no point at all is found out by the plan.
+        position = (
+            np.asarray(start)[:2]
+            if self._last.robot.has_heading and np.shape(start) == (3,)
+            else start
+        )
+        return self.heatmap.connects(position, self._last.goal[:2])
 
 
 def _frame(grid: GridMap) -> tuple[object, ...]:

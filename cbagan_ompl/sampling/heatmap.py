@@ -337,16 +337,3 @@ class Heatmap:
     def __repr__(self) -> str:
         fraction = self.region.sum() / self.grid.free.sum()
         return f"Heatmap({self.grid.name!r}, region {fraction:.0%} of free space)"
-
-
-def check_heatmap(heatmap: object) -> None:
-    """Raise if a value is no heat map.
-
-    Raises:
-        HeatmapError: it is none; the message says how to make one of an array.
-    """
-    if not isinstance(heatmap, Heatmap):
-        raise HeatmapError(
-            f"expected a Heatmap, got {show(heatmap)}; an array of values becomes one with "
-            "Heatmap(values, grid)"
-        )
