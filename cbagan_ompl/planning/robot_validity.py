@@ -7,13 +7,13 @@ from math import pi
 from typing import Any
 
 from ..errors import PlannerError, RobotError, show
+from ..maps.checks import check_grid
 from ..maps.grid_map import GridMap
 from ..robots.robot import Robot
 from ..robots.shape_checker import Pose, ShapeChecker
 from . import compat
 from .compat import ob
 from .states import pose_space, space_of
-from .validity import check_grid
 
 _LAST_VALID_PRECISION = 1e-3
 

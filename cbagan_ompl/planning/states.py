@@ -120,6 +120,11 @@ def state_access(space: Any, headings: HeadingSampler | None = None) -> StateAcc
     )
 
 
+def read_pose(state: Any) -> tuple[float, float, float]:
+    """Return the (x, y, yaw) of a state of an SE2StateSpace."""
+    return state.getX(), state.getY(), state.getYaw()
+
+
 def pose_space(space: Any) -> Any:
     """Return the SE2StateSpace that a space is or holds as its first part; None without one.
 

@@ -100,15 +100,9 @@ def _trace(
 ) -> None:
     """Widen the extent of each row by the part of a chain in it, the margin above and below too."""
     u0, v0 = chain[0]
-    row = int(v0 - margin) - first
-    if u0 < lefts[row]:
-        lefts[row] = u0
-    if u0 > rights[row]:
-        rights[row] = u0
-    for u1, v1 in chain[1:]:
+    for u1, v1 in chain[1:] or chain:
         slope = (u1 - u0) / (v1 - v0) if v1 > v0 else 0.0
         row, last = int(v0 - margin), int(v1 + margin)
-        # Where the edge enters the first row; it leaves each row where the next one begins.
         while row <= last:
             upper, lower = row - margin, row + 1 + margin
             a = u0 + (upper - v0) * slope if upper > v0 else u0

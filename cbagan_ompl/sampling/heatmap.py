@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from os import PathLike
-from pathlib import Path
 from typing import SupportsIndex
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..common.files import as_path
 from ..common.validation import random_generator, whole_number
 from ..errors import HeatmapError, show
+from ..maps.checks import check_grid
 from ..maps.connectivity import in_one_component
 from ..maps.endpoints import check_point
 from ..maps.grid_map import GridMap
@@ -19,7 +20,7 @@ from .bands import half_width, paint_band
 from .bridges import bridge
 from .headings import check_headings, descend, look_up, sample_headings
 from .heatmap_files import read_heatmap_values
-from .heatmap_values import check_grid, to_unit_range
+from .heatmap_values import to_unit_range
 from .options import HeadingSpread
 from .pixels import pixel_pair, sample_in_pixels, sample_pixels
 
@@ -64,7 +65,7 @@ class Heatmap:
     """
 
     def __init__(self, values: ArrayLike, grid: GridMap, heading: ArrayLike | None = None) -> None:
-        check_grid(grid)
+        check_grid(grid, HeatmapError)
         try:
             raw = np.asarray(values)
         except Exception as error:  # rows of different lengths, or whatever the class raises
@@ -110,10 +111,8 @@ class Heatmap:
             ...     Heatmap.load(path, GridMap([[1, 1]])).region.tolist()
             [[False, True]]
         """
-        check_grid(grid)
-        if not isinstance(path, str | PathLike):
-            raise HeatmapError(f"the file of a heat map is a path, got {show(path)}")
-        return cls(read_heatmap_values(Path(path), grid.shape), grid)
+        check_grid(grid, HeatmapError)
+        return cls(read_heatmap_values(as_path(path, HeatmapError), grid.shape), grid)
 
     @classmethod
     def uniform(cls, grid: GridMap) -> Heatmap:
@@ -126,7 +125,7 @@ class Heatmap:
             >>> Heatmap.uniform(GridMap([[1, 0], [1, 1]])).values.tolist()
             [[1.0, 0.0], [1.0, 1.0]]
         """
-        check_grid(grid)
+        check_grid(grid, HeatmapError)
         return cls(grid.free, grid)
 
     @classmethod
@@ -145,7 +144,7 @@ class Heatmap:
             >>> Heatmap.straight_line(GridMap.load("bundled:rooms"), (20, 20), (230, 20))
             Heatmap('rooms', region 6% of free space)
         """
-        check_grid(grid)
+        check_grid(grid, HeatmapError)
         endpoints = grid.check_task(start, goal)
         return cls(
             paint_band(grid.shape, grid.to_pixel(endpoints), half_width(grid, _CORRIDOR_FRACTION)),
@@ -172,7 +171,7 @@ class Heatmap:
             >>> heatmap.connects((20, 20), (230, 230))
             True
         """
-        check_grid(grid)
+        check_grid(grid, HeatmapError)
         endpoints = grid.to_pixel(grid.check_task(start, goal))
         pixels = shortest_path(grid.free, *pixel_pair(endpoints))
         assert pixels is not None, "check_task has made sure that a path exists"
@@ -229,9 +228,8 @@ class Heatmap:
         endpoints = self.grid.to_pixel(self.grid.check_task(start, goal))
         if self.connects(start, goal):
             return self
-        return Heatmap(
-            bridge(self.values, self.region, self.grid, endpoints), self.grid, self.heading
-        )
+        values = bridge(self.values, self.region, self.grid, endpoints)
+        return Heatmap(values, self.grid, self.heading)
 
     def with_heading(self, heading: ArrayLike | None) -> Heatmap:
         """Return this heat map with other headings.

@@ -1,4 +1,4 @@
-"""What heat maps are made of, checked: the map and the values."""
+"""The values that heat maps are made of, checked."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import HeatmapError, show
-from ..maps.grid_map import GridMap
+from ..errors import HeatmapError
 
 
 def to_unit_range(raw: NDArray[Any]) -> NDArray[np.float32]:
@@ -39,16 +38,3 @@ def to_unit_range(raw: NDArray[Any]) -> NDArray[np.float32]:
             "shift and scale them first"
         )
     return values
-
-
-def check_grid(grid: object) -> None:
-    """Raise if a value is no map for a heat map.
-
-    Raises:
-        HeatmapError: it is no :class:`GridMap`.
-    """
-    if not isinstance(grid, GridMap):
-        raise HeatmapError(
-            f"a heat map lies on a GridMap, got {show(grid)}; an array of free pixels becomes one "
-            "with GridMap(free), a map file with GridMap.load(path)"
-        )

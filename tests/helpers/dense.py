@@ -34,7 +34,7 @@ class DenseCheck:
         """Whether each pose (N, 3) touches a blocked pixel or is not all on the map."""
         radius = self.robot.radius / self.grid.resolution
         shapes = self.shapes(poses)
-        left, top, right, bottom = (shapely.bounds(shapes) + (-radius, -radius, radius, radius)).T
+        left, top, right, bottom = (shapely.bounds(shapes) + np.array((-1, -1, 1, 1)) * radius).T
         result = (left < 0) | (top < 0) | (right > self.grid.width) | (bottom > self.grid.height)
         if self.robot.vertices is None:
             hits, _ = self.tree.query(shapes, predicate="dwithin", distance=radius)

@@ -22,7 +22,7 @@ from cbagan_ompl.sampling.options import (
 def test_defaults() -> None:
     options = SamplerOptions()
     assert options == SamplerOptions(
-        DEFAULT_UNIFORM_FRACTION, None, FULL_ADAPTATION, HeadingSpread(), None
+        DEFAULT_UNIFORM_FRACTION, None, FULL_ADAPTATION, None, HeadingSpread()
     )
     assert 0 < options.uniform_fraction < 1
     assert options.adaptation == Adaptation(True, True, True)
