@@ -44,6 +44,7 @@ from cbagan_ompl import (
 from cbagan_ompl.common.files import write_json
 from cbagan_ompl.map_generators import MAP_GENERATORS
 from cbagan_ompl.maps.grid_search import shortest_path
+from cbagan_ompl.maps.tasks import load_tasks
 from cbagan_ompl.planning import compat
 from cbagan_ompl.robots.shape_checker import ShapeChecker
 
@@ -270,7 +271,7 @@ def file_tasks(args: argparse.Namespace) -> Iterator[PoseTask]:
     for word in args.maps:
         grid = GridMap.load(word)
         found = 0
-        for task in tasks_of(args.tasks or word, grid):
+        for task in load_tasks(args.tasks, grid) if args.tasks else tasks_of(word, grid):
             pose = pose_task(f"{grid.name}-{found}", grid, grid, task.start, task.goal, 0.0)
             if pose is not None and found < args.tasks_per_map:
                 found += 1
@@ -297,7 +298,8 @@ def pose_task(
         fits = [yaw + turn for turn in turns if checker.pose_is_free(x, y, yaw + turn)]
         if not fits:
             return None
-        poses.append((x, y, fits[0]))
+        # A yaw of pi is out of OMPL's bounds.
+        poses.append((x, y, (fits[0] + pi) % (2 * pi) - pi))
     return PoseTask(name, grid, *poses)
 
 
