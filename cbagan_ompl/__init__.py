@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from .plotting import save_figure
     from .robots.robot import Robot
     from .sampling.heatmap import Heatmap
-    from .sampling.options import Adaptation, SamplerOptions
+    from .sampling.options import Adaptation, HeadingSpread, SamplerOptions
 
 __version__ = "0.2.0"
 
@@ -59,6 +59,7 @@ __all__ = [
     "GridMap",
     "GridMotionValidator",
     "GridValidityChecker",
+    "HeadingSpread",
     "Heatmap",
     "HeatmapError",
     "HeatmapStateSampler",
@@ -108,7 +109,7 @@ _HOMES = {
     "plotting": ("save_figure",),
     "robots.robot": ("Robot",),
     "sampling.heatmap": ("Heatmap",),
-    "sampling.options": ("Adaptation", "SamplerOptions"),
+    "sampling.options": ("Adaptation", "HeadingSpread", "SamplerOptions"),
 }
 protect_exit()
 

@@ -7,6 +7,7 @@ map.
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from importlib import resources
 from pathlib import Path
@@ -14,13 +15,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..common.files import read_bytes
+from ..common.files import as_path, read_bytes
 from ..common.validation import finite_number, positive_number
 from ..errors import ConfigError, MapError, show
 from .image_files import MAX_IMAGE_BYTES, SUFFIXES, decode_image
 from .movingai import read_movingai_map
 from .raw_map import RawMap
-from .ros import read_ros_map
+from .ros import image_of_ros_map, read_ros_map
 from .svg import read_svg_map
 
 if TYPE_CHECKING:
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 
 #: What a path to a map that comes with the package begins with.
 BUNDLED = "bundled:"
+
+_YAML_SUFFIXES = (".yaml", ".yml")
 
 
 @dataclass(frozen=True)
@@ -79,16 +82,16 @@ def read_map(path: str | os.PathLike[str], **options: Any) -> RawMap:
         if option not in known:
             raise ConfigError(f"unknown map option {show(option)}; known are {', '.join(known)}")
     settings = MapOptions(**options)
+    file = as_path(path, MapError)
     if str(path).startswith(BUNDLED):
         return _read_bundled(str(path).removeprefix(BUNDLED), settings)
 
-    file = Path(path)
     suffix = file.suffix.lower()
     if suffix in SUFFIXES:
         return _read_image_map(
             read_bytes(file, limit=MAX_IMAGE_BYTES), str(file), file.stem, settings
         )
-    if suffix in (".yaml", ".yml"):
+    if suffix in _YAML_SUFFIXES:
         return read_ros_map(file, unknown_is_free=settings.unknown_is_free)
     if suffix == ".map":
         return read_movingai_map(file)
@@ -98,6 +101,25 @@ def read_map(path: str | os.PathLike[str], **options: Any) -> RawMap:
         f"{file}: unknown kind of map file; known are {', '.join(SUFFIXES)} (images), .yaml and "
         f".yml (ROS map_server), .map (MovingAI), .svg (convex polygons) and {BUNDLED}NAME"
     )
+
+
+def map_files(path: str | os.PathLike[str]) -> list[Path]:
+    """Return the files that a map is read from: the one that is given, and what it names.
+
+    Args:
+        path: a file for :func:`read_map`; none for ``bundled:NAME``.
+
+    Example:
+        >>> map_files("bundled:maze"), [file.name for file in map_files("maps/hall.png")]
+        ([], ['hall.png'])
+    """
+    if str(path).startswith(BUNDLED):
+        return []
+    file = Path(path)
+    if file.suffix.lower() in _YAML_SUFFIXES:
+        with suppress(MapError):  # raised again when it is read
+            return [file, image_of_ros_map(file)]
+    return [file]
 
 
 def bundled_maps() -> tuple[str, ...]:

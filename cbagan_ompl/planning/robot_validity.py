@@ -7,13 +7,13 @@ from math import pi
 from typing import Any
 
 from ..errors import PlannerError, RobotError, show
+from ..maps.checks import check_grid
 from ..maps.grid_map import GridMap
 from ..robots.robot import Robot
 from ..robots.shape_checker import Pose, ShapeChecker
 from . import compat
 from .compat import ob
-from .states import space_of
-from .validity import check_grid
+from .states import pose_space, space_of
 
 _LAST_VALID_PRECISION = 1e-3
 
@@ -183,16 +183,6 @@ def shape_checker(grid: GridMap, robot: Robot) -> ShapeChecker:
     if not isinstance(robot, Robot):
         raise RobotError(f"expected a Robot, got {show(robot)}; make one with Robot.rectangle(...)")
     return ShapeChecker.of(grid, robot)
-
-
-def pose_space(space: Any) -> Any:
-    """Return the SE2StateSpace that a space is, or has as its first part; None without one."""
-    if isinstance(space, ob.SE2StateSpace):
-        return space
-    if isinstance(space, ob.CompoundStateSpace) and space.getSubspaceCount():
-        first = space.getSubspace(0)
-        return first if isinstance(first, ob.SE2StateSpace) else None
-    return None
 
 
 def pose_reader(space: Any, robot: Robot) -> Callable[[Any], Pose]:

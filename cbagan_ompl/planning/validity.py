@@ -5,7 +5,8 @@ from __future__ import annotations
 from math import floor
 from typing import Any
 
-from ..errors import MapError, PlannerError, show
+from ..errors import PlannerError
+from ..maps.checks import check_grid
 from ..maps.collision import segment_is_free
 from ..maps.grid_map import GridMap
 from ..robots.robot import Robot
@@ -135,12 +136,6 @@ class GridMotionValidator(ob.MotionValidator):  # type: ignore[misc]
         last_valid.second = low
         if last_valid.first is not None:
             self._space.interpolate(s1, s2, low, last_valid.first)
-
-
-def check_grid(grid: object) -> None:
-    """Raise a MapError if something is no map."""
-    if not isinstance(grid, GridMap):
-        raise MapError(f"expected a GridMap, got {show(grid)}; load one with GridMap.load(path)")
 
 
 def _straight_state_access(space: Any) -> StateAccess:
