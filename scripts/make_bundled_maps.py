@@ -30,6 +30,9 @@ SIZES = {"warehouse": (320, 192)}
 # What the poses are for: it fits through all passages on the way of every task.
 CAR = Robot.rectangle(12, 6, turning_radius=10, reverse=True)
 
+# The headings at both ends of a task are those towards the path so far away, in pixels.
+_AHEAD = 15.0
+
 # The parking lot, in pixels: slots across and along, the lane between two rows of slots, the wall
 # around it, and the share of the slots that are taken.
 SLOT, LANE, WALL, TAKEN = (8, 16), 20, 3, 0.8
@@ -143,10 +146,15 @@ def driven_poses(
     pixels = shortest_path(free, task[:2], task[2:])
     assert pixels is not None
     path = pull_taut(free, pixels)
-    moves = np.diff(path, axis=0)
+    along = np.concatenate(([0.0], np.hypot(*np.diff(path, axis=0).T).cumsum()))
+    ahead, behind = (
+        [float(np.interp(place, along, axis)) for axis in path.T]
+        for place in (_AHEAD, along[-1] - _AHEAD)
+    )
     (x0, y0), (x1, y1) = path[0].tolist(), path[-1].tolist()
-    (a, b), (c, d) = moves[0].tolist(), moves[-1].tolist()
-    return [(x0, y0, atan2(b, a)), (x1, y1, atan2(d, c))]
+    leaving = atan2(ahead[1] - y0, ahead[0] - x0)
+    arriving = atan2(y1 - behind[1], x1 - behind[0])
+    return [(x0, y0, leaving), (x1, y1, arriving)]
 
 
 def main() -> None:
