@@ -28,15 +28,15 @@ SEED = 4
 SIZES = {"warehouse": (320, 192)}
 
 # What the poses are for: it fits through all passages on the way of every task.
-CAR = Robot.rectangle(12, 6, turning_radius=10, reverse=True)
+CAR = Robot.rectangle(8, 4, turning_radius=6, reverse=True)
 
 # The headings at both ends of a task are those towards the path so far away, in pixels.
 _AHEAD = 15.0
 
 # The parking lot, in pixels: slots across and along, the lane between two rows of slots, the wall
 # around it, and the share of the slots that are taken.
-SLOT, LANE, WALL, TAKEN = (8, 16), 20, 3, 0.8
-PARKING_WIDTH = 2 * WALL + 31 * SLOT[0]
+SLOT, LANE, WALL, TAKEN = (6, 11), 15, 3, 0.8
+ROWS, COLUMNS = 8, 41
 
 # Start and goal pixels, chosen by eye; in the parking lot free slots. The first of a map is the most instructive one.
 TASKS = {
@@ -58,12 +58,7 @@ TASKS = {
         (184, 240, 60, 130),
     ],
     # Into a slot, from slot to slot across the lot, out of one, and into the one behind.
-    "parking": [
-        (14, 133, 191, 11),
-        (55, 11, 183, 151),
-        (135, 47, 244, 133),
-        (111, 63, 183, 99),
-    ],
+    "parking": [(12, 132, 144, 8), (42, 8, 192, 145), (96, 34, 240, 95), (108, 45, 162, 71)],
     "rooms": [(14, 14, 242, 242), (242, 14, 14, 242), (14, 118, 244, 160), (62, 216, 206, 62)],
     "walls_with_gaps": [
         (14, 20, 240, 240),
@@ -79,9 +74,9 @@ TASKS = {
 def slots() -> Iterator[tuple[float, float, float]]:
     """Yield the pose of a car in each slot of the parking lot, its front towards the lane."""
     top = WALL
-    for row in range(6):
+    for row in range(ROWS):
         # A lane lies below each even row, and one to the left and to the right of inner rows.
-        first, last = (0, 31) if row in (0, 5) else (3, 28)
+        first, last = (0, COLUMNS) if row in (0, ROWS - 1) else (3, COLUMNS - 3)
         for column in range(first, last):
             x = WALL + SLOT[0] * (column + 0.5)
             yield x, top + SLOT[1] / 2, pi / 2 if row % 2 == 0 else -pi / 2
@@ -91,12 +86,13 @@ def slots() -> Iterator[tuple[float, float, float]]:
 def draw_parking() -> NDArray[np.bool_]:
     """Return the parking lot, with a car in most of the slots."""
     rng = np.random.default_rng([SEED, *b"parking"])
-    free = np.zeros((2 * WALL + 6 * SLOT[1] + 3 * LANE, PARKING_WIDTH), bool)
+    height = 2 * WALL + ROWS * SLOT[1] + ROWS // 2 * LANE
+    free = np.zeros((height, 2 * WALL + COLUMNS * SLOT[0]), bool)
     free[WALL:-WALL, WALL:-WALL] = True
     for x, y, _ in slots():
         if rng.random() < TAKEN:
-            left, upper = int(x - 3 + rng.integers(-1, 2)), int(y - 6 + rng.integers(-2, 3))
-            free[upper : upper + 12, left : left + 6] = False
+            left, upper = int(x - 2 + rng.integers(-1, 2)), int(y - 4 + rng.integers(-1, 2))
+            free[upper : upper + 8, left : left + 4] = False
     return free
 
 

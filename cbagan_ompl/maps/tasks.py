@@ -98,7 +98,7 @@ def tasks_of(
         path: what the map was loaded from.
         grid: the map.
         with_yaw: return tasks for robots with heading. Those of the bundled maps are for a car of
-            12 x 6 pixels that drives backwards too, with a turning radius of 10 pixels.
+            8 x 4 pixels that drives backwards too, with a turning radius of 6 pixels.
 
     Returns:
         The tasks, none for other maps.
