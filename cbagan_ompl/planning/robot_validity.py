@@ -124,7 +124,10 @@ class RobotMotionValidator(ob.MotionValidator):  # type: ignore[misc]
                 to the last valid state (to within a thousandth of the motion) and how far along
                 the motion it is.
         """
-        free = self._is_free(s1, s2, 1.0)
+        if self._curvature is None:
+            free = self._checker.straight_is_free(*self._read(s1), *self._read(s2))
+        else:
+            free = self._is_free(s1, s2, 1.0)
         if last_valid and not free:
             self._set_last_valid(last_valid[0], s1, s2)
         return free

@@ -68,11 +68,11 @@ class ClearanceTables:
         self.stack = np.empty((self.count + 1, free.size), np.uint8)
         self.stack[0] = any_heading.reshape(-1)
         #: The row of the stack for each range of headings, over four full turns, so that sums of
-        #: headings need no reduction; and the tables themselves in that order.
-        self.slots = np.zeros(4 * self.count, np.int32)
+        #: headings need no reduction; then how often the table of each range did not know.
+        self.counts = np.zeros(5 * self.count, np.int64)
+        self.slots, self.uses = self.counts[: 4 * self.count], self.counts[4 * self.count :]
+        #: The tables in the order of the slots.
         self.by_heading = [memoryview(self.stack[0])] * (4 * self.count)
-        #: How often the table of a range of headings did not know.
-        self.uses = np.zeros(self.count, np.int64)
 
     def refine(self, index: int) -> bool:
         """Note that a table did not know; return whether a better one has taken its place.

@@ -17,8 +17,8 @@ TURN = 2 * pi
 
 # Given, so that whole numbers among the coordinates lead to no second compilation.
 _SIGNATURE = (
-    "int64(float64, float64, float64, float64, float64, float64, uint8[:, ::1], int32[::1],"
-    "int64[::1], uint16[:, ::1], float64[:, ::1], int64[::1], float64[:, ::1], float64[::1])"
+    "int64(float64, float64, float64, float64, float64, float64, uint8[:, ::1], int64[::1],"
+    "uint16[:, ::1], float64[:, ::1], int64[::1], float64[:, ::1])"
 )
 
 # Most parts of a motion that are left to the exact test one by one; beyond that all of it is.
@@ -157,8 +157,7 @@ def _gap_is_free(
 def _motion_is_free(  # noqa: C901 - one loop on purpose
     motion: Any,
     tables: Any,
-    slots: Any,
-    uses: Any,
+    counts: Any,
     runs: Any,
     parts: Any,
     starts: Any,
@@ -167,6 +166,7 @@ def _motion_is_free(  # noqa: C901 - one loop on purpose
 ) -> int:
     u, v, heading, du, dv, turn = motion
     height, width = runs.shape
+    ranges = len(counts) // 5
     wanted = gaps = 0
     movement = (du * du + dv * dv) ** 0.5 + constants[0] * abs(turn)
     per_value, look = 2.0, 2.0
@@ -178,13 +178,13 @@ def _motion_is_free(  # noqa: C901 - one loop on purpose
         if not (0 <= at_u < width and 0 <= at_v < height and at >= 0):
             return wanted
         index = int(at * constants[2])
-        value = int(tables[slots[index], int(at_v) * width + int(at_u)])
+        value = int(tables[counts[index], int(at_v) * width + int(at_u)])
         if value == BLOCKED:
             return wanted
         if value == UNKNOWN:
-            index %= len(uses)
-            uses[index] += 1
-            if uses[index] == constants[7]:
+            index %= ranges
+            counts[4 * ranges + index] += 1
+            if counts[4 * ranges + index] == constants[7]:
                 wanted = 2 * index + 2
         reach = (value - CLEAR) * per_value
         if t == 1.0:
@@ -219,13 +219,11 @@ def straight_is_free(
     y1: float,
     yaw1: float,
     tables: Any,
-    slots: Any,
-    uses: Any,
+    counts: Any,
     runs: Any,
     parts: Any,
     starts: Any,
     scratch: Any,
-    constants: Any,
 ) -> int:
     """Return whether a straight motion touches nothing, and which table would have helped.
 
@@ -237,19 +235,21 @@ def straight_is_free(
         y1: where it ends, world.
         yaw1: where it ends, radians.
         tables: (K, H * W), the tables that are made.
-        slots: for each range of headings in four full turns, which table is its own.
-        uses: for each range of headings, how often its table did not know; counted here.
+        counts: for each range of headings in four full turns which table is its own, then for each
+            range how often its table did not know; counted here.
         runs: (H, W), free pixels to the right of each, itself included.
         parts: (N, 2), the vertices of all convex parts.
         starts: where in ``parts`` each part begins, and the end.
-        scratch: (8, M), M at least 32, twice the vertices of a part and the rows of the map.
-        constants: as from ``ShapeChecker``: radius, diameter, ranges per radian, least step, worth
-            a test, conservatism, rounding, after how many uses a table is wanted, whether the
-            shape turns, sign and phase of headings, and the six numbers from world to pixels.
+        scratch: (9, M), M at least 32, twice the vertices of a part and the rows of the map. The
+            last row holds, as from ``ShapeChecker``: radius, diameter, ranges per radian, least
+            step, worth a test, conservatism, rounding, after how many uses a table is wanted,
+            whether the shape turns, sign and phase of headings, and the six numbers from world to
+            pixels.
 
     Returns:
         1 or 0, plus twice the index from 1 on of the range of headings whose table is wanted.
     """
+    constants = scratch[8]
     a, b, c = constants[11], constants[12], constants[13]
     d, e, f = constants[14], constants[15], constants[16]
     u, v = a * x0 + b * y0 + c, d * x0 + e * y0 + f
@@ -262,4 +262,4 @@ def straight_is_free(
             turn = (turn + pi) % TURN - pi
         turn *= constants[9]
     motion = (u, v, heading, du, dv, turn)
-    return _motion_is_free(motion, tables, slots, uses, runs, parts, starts, scratch, constants)
+    return _motion_is_free(motion, tables, counts, runs, parts, starts, scratch, constants)

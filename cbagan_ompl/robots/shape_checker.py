@@ -206,12 +206,10 @@ class ShapeChecker:
             *(self._rounding, _COMPILED_USES, float(shape.turns), shape.sign, shape.phase),
             *self._affine,
         )
-        return (
-            *(tables.stack, tables.slots, tables.uses, runs, np.concatenate(shape.parts)),
-            np.cumsum([0, *counts]),
-            np.empty((8, max(32, height + 2, 2 * max(counts)))),
-            np.array(constants),
-        )
+        scratch = np.zeros((9, max(32, height + 2, 2 * max(counts))))
+        scratch[8, : len(constants)] = constants
+        starts = np.cumsum([0, *counts])
+        return tables.stack, tables.counts, runs, np.concatenate(shape.parts), starts, scratch
 
     def _march(self, pose_at: PoseAt, movement: float) -> list[tuple[float, float]] | None:
         """Return the parts of a motion that tables do not decide; None where it collides.

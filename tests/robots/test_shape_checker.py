@@ -72,7 +72,7 @@ def test_motions_are_those_of_the_dense_check(name: str, ros: bool) -> None:
     checker, dense = ShapeChecker(grid, robot), DenseCheck(grid, robot)
     rng = np.random.default_rng(4)
     count = {"free": 0, "refused": 0}
-    for _ in range(250):
+    for _ in range(150):
         start, end = random_poses(grid, rng, 2)
         if rng.random() < 0.7:
             end[:2] = start[:2] + rng.normal(0, 10 * grid.resolution, 2)
@@ -85,11 +85,11 @@ def test_motions_are_those_of_the_dense_check(name: str, ros: bool) -> None:
         assert not (free and collides), (start, end)
         count["free"] += free
         count["refused"] += not free and not collides
-    assert count["free"] > 20
+    assert count["free"] > 10
     assert count["refused"] <= 0.1 * count["free"] + 1
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(st.integers(0, 2**32), st.sampled_from(sorted(ROBOTS)))
 def test_a_free_motion_has_free_poses_only(seed: int, name: str) -> None:
     rng = np.random.default_rng(seed)
@@ -108,9 +108,9 @@ def test_tables_and_exact_tests_agree() -> None:
     rng = np.random.default_rng(6)
     for index in range(made.tables.count):
         made.tables.make(index)
-    for pose in random_poses(grid, rng, 2000).tolist():
+    for pose in random_poses(grid, rng, 1000).tolist():
         assert lazy.pose_is_free(*pose) == made.pose_is_free(*pose)
-    for start in random_poses(grid, rng, 1500):
+    for start in random_poses(grid, rng, 400):
         motion = [*start.tolist(), *(start + rng.normal(0, (6, 6, 0.5))).tolist()]
         assert lazy.straight_is_free(*motion) == made.straight_is_free(*motion)
 
@@ -125,7 +125,7 @@ def test_the_compiled_check_gives_the_same_answers(name: str, ros: bool) -> None
     assert compiled.compile()
     rng = np.random.default_rng(12)
     answers = set()
-    for _ in range(1500):
+    for _ in range(300):
         start, end = random_poses(grid, rng, 2)
         if rng.random() < 0.8:
             end[:2] = start[:2] + rng.normal(0, 8 * grid.resolution, 2)
