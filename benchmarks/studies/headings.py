@@ -270,9 +270,10 @@ def file_tasks(args: argparse.Namespace) -> Iterator[PoseTask]:
     """Yield the first few tasks on each map that the robot can begin and end."""
     for word in args.maps:
         grid = GridMap.load(word)
+        inflated = grid.inflated(WIDTH / 2)
         found = 0
         for task in load_tasks(args.tasks, grid) if args.tasks else tasks_of(word, grid):
-            pose = pose_task(f"{grid.name}-{found}", grid, grid, task.start, task.goal, 0.0)
+            pose = pose_task(f"{grid.name}-{found}", grid, inflated, task.start, task.goal, 0.0)
             if pose is not None and found < args.tasks_per_map:
                 found += 1
                 yield pose
@@ -283,7 +284,8 @@ def pose_task(
 ) -> PoseTask | None:
     """Return a task with the yaws of the shortest path at its ends; None if the robot collides."""
     ends = [tuple(map(int, grid.to_pixel(point))) for point in (start, goal)]
-    path = shortest_path(wide.free, *ends)
+    fits = wide.is_free(np.array((start, goal))).all()
+    path = shortest_path(wide.free, *ends) if fits else None
     if path is None or np.hypot(*np.diff(path, axis=0).T).sum() < max(
         shortest, DETOUR * np.hypot(*(path[-1] - path[0])) * (shortest > 0)
     ):
@@ -295,11 +297,11 @@ def pose_task(
         # Where the robot does not fit that way round, the nearest heading in which it does.
         turns = [0.0, *(s * k * pi / 12 for k in range(1, 6) for s in (1, -1))]
         x, y, yaw = float(point[0]), float(point[1]), atan2(dv, du)
-        fits = [yaw + turn for turn in turns if checker.pose_is_free(x, y, yaw + turn)]
-        if not fits:
+        free = [yaw + turn for turn in turns if checker.pose_is_free(x, y, yaw + turn)]
+        if not free:
             return None
         # A yaw of pi is out of OMPL's bounds.
-        poses.append((x, y, (fits[0] + pi) % (2 * pi) - pi))
+        poses.append((x, y, (free[0] + pi) % (2 * pi) - pi))
     return PoseTask(name, grid, *poses)
 
 

@@ -63,7 +63,7 @@ def test_paper_tables(folder: Path, tmp_path: Path) -> None:
 def test_headings(tmp_path: Path) -> None:
     pytest.importorskip("torch")
     rows, report = tmp_path / "rows.jsonl", tmp_path / "headings.json"
-    words = ["--maps", "bundled:narrow_passage", "--tasks-per-map", "1", "--planners", "RRT"]
+    words = ["--maps", "bundled:rooms", "--tasks-per-map", "1", "--planners", "RRT"]
     words += ["--spaces", "SE2,Reeds-Shepp 10", "--time", "0.5", "--first", "--rows", str(rows)]
     for _ in range(2):  # the second time every run is there already
         run_script(STUDIES / "headings.py", *words, "--json", str(report))
