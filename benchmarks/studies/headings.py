@@ -70,7 +70,7 @@ GENERATORS = (
     "walls_with_gaps",
     "warehouse",
 )
-SIDE, WIDE, SHORTEST, DETOUR = 256, 5.0, 220.0, 1.3
+SIDE, WIDE, SHORTEST, DETOUR = 256, 4.0, 300.0, 1.5
 POSITIONS_ONLY = HeadingSpread(uniform_fraction=1)
 WAYS: dict[str, HeadingSpread | None] = {
     "OMPL's own": None,
