@@ -72,3 +72,17 @@ def test_headings(tmp_path: Path) -> None:
     samplers = ["OMPL's own", "positions only", "default"]
     assert [row["sampler"] for row in summary] == samplers
     assert all((row["inference_ms"] > 0) == (row["sampler"] != "OMPL's own") for row in summary)
+
+
+def test_replanning(tmp_path: Path) -> None:
+    pytest.importorskip("torch")
+    report = tmp_path / "replanning.json"
+    words = ["bundled:rooms", "--tasks-per-map", "1", "--cycles", "4", "--json", str(report)]
+    printed = run_script(STUDIES / "replanning.py", *words)
+    result = json.loads(report.read_text())
+    for scene in ("static", "obstacles"):
+        assert f"{scene} kept" in printed
+        assert result[scene].keys() == {"uniform", "fresh", "kept"}
+        assert all(of["cycles"] == 4 for of in result[scene].values())
+        assert result[scene]["uniform"]["kept"] == result[scene]["fresh"]["kept"] == 0
+    assert result["static"]["kept"]["kept"] >= 0.5
