@@ -55,8 +55,7 @@ SPACES = {
     "Dubins 5": {"turning_radius": 5.0},
     "Reeds-Shepp 10": {"turning_radius": 10.0, "reverse": True},
 }
-# Maps on which the way is not straight. They are generated at half their size and enlarged, so
-# that the robot fits through.
+# Maps on which the way is not straight, generated at half their size and enlarged for the robot.
 GENERATORS = (
     "bug_trap",
     "caves",
@@ -93,6 +92,7 @@ class PoseTask:
     grid: GridMap
     start: tuple[float, float, float]
     goal: tuple[float, float, float]
+    length: float
 
 
 def main() -> None:
@@ -267,16 +267,17 @@ def generated_tasks(count: int) -> Iterator[PoseTask]:
 
 
 def file_tasks(args: argparse.Namespace) -> Iterator[PoseTask]:
-    """Yield the first few tasks on each map that the robot can begin and end."""
+    """Yield the few tasks on each map that are the longest for the robot."""
     for word in args.maps:
         grid = GridMap.load(word)
         inflated = grid.inflated(WIDTH / 2)
-        found = 0
-        for task in load_tasks(args.tasks, grid) if args.tasks else tasks_of(word, grid):
-            pose = pose_task(f"{grid.name}-{found}", grid, inflated, task.start, task.goal, 0.0)
-            if pose is not None and found < args.tasks_per_map:
-                found += 1
-                yield pose
+        tasks = load_tasks(args.tasks, grid) if args.tasks else tasks_of(word, grid)
+        poses = [
+            pose_task(f"{grid.name}-{number}", grid, inflated, task.start, task.goal, 0.0)
+            for number, task in enumerate(tasks)
+        ]
+        fitting = [task for task in poses if task is not None]
+        yield from sorted(fitting, key=lambda task: -task.length)[: args.tasks_per_map]
 
 
 def pose_task(
@@ -286,9 +287,10 @@ def pose_task(
     ends = [tuple(map(int, grid.to_pixel(point))) for point in (start, goal)]
     fits = wide.is_free(np.array((start, goal))).all()
     path = shortest_path(wide.free, *ends) if fits else None
-    if path is None or np.hypot(*np.diff(path, axis=0).T).sum() < max(
-        shortest, DETOUR * np.hypot(*(path[-1] - path[0])) * (shortest > 0)
-    ):
+    if path is None:
+        return None
+    length = float(np.hypot(*np.diff(path, axis=0).T).sum())
+    if shortest and length < max(shortest, DETOUR * np.hypot(*(path[-1] - path[0]))):
         return None
     reach = min(12, len(path) - 1)
     checker = ShapeChecker.of(grid, Robot.rectangle(LENGTH, WIDTH))
@@ -302,7 +304,7 @@ def pose_task(
             return None
         # A yaw of pi is out of OMPL's bounds.
         poses.append((x, y, (free[0] + pi) % (2 * pi) - pi))
-    return PoseTask(name, grid, *poses)
+    return PoseTask(name, grid, *poses, length)
 
 
 def summarise(done: list[dict[str, Any]]) -> list[dict[str, Any]]:
