@@ -86,9 +86,7 @@ def load_tasks(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
     raise MapError(f"{file}: unknown kind of task file; known are .scen and .csv")
 
 
-def tasks_of(
-    path: str | os.PathLike[str], grid: GridMap, *, with_yaw: bool = False
-) -> list[Task]:
+def tasks_of(path: str | os.PathLike[str], grid: GridMap, *, with_yaw: bool = False) -> list[Task]:
     """Return the tasks that come with a map.
 
     These are those of the package for ``bundled:NAME``, and those in ``NAME.map.scen`` or
