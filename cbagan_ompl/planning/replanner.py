@@ -11,10 +11,12 @@ from numpy.typing import ArrayLike
 from ..common.validation import whole_number
 from ..errors import MapError, show
 from ..maps.grid_map import GridMap
+from ..robots.poses import check_pose
 from ..sampling.heatmap import Heatmap
 from .heatmap_sources import LEARNED, heatmap_source, loaded_model
-from .plan import plan
+from .plan import plan, robot_of
 from .plan_result import PlanResult
+from .workspace import Workspace
 
 if TYPE_CHECKING:
     from ..inference.predictor import Predictor
@@ -36,13 +38,14 @@ class Replanner:
 
     Args:
         grid: the map.
-        goal: (x, y), world.
+        goal: (x, y), world; (x, y, yaw) for a robot with heading.
         planner: see :func:`cbagan_ompl.plan`; the default stops at its first path.
         sampler: see there.
         model: for the learned sampler, a loaded model or the file of one, which is loaded here,
             once; the bundled model by default.
-        **options: of every plan, as keyword arguments of :func:`cbagan_ompl.plan`: ``radius``,
-            ``time``, ``range``... With a ``seed`` the n-th plan has ``seed + n``, from 0.
+        **options: of every plan, as keyword arguments of :func:`cbagan_ompl.plan`: ``robot``,
+            ``radius``, ``time``, ``range``... With a ``seed`` the n-th plan, from 0, has
+            ``seed + n``.
 
     Raises:
         MapError: ``grid`` is no map.
@@ -85,7 +88,7 @@ class Replanner:
         """Plan from a start to the goal.
 
         Args:
-            start: (x, y), world: where the robot is.
+            start: (x, y) or (x, y, yaw), world: where the robot is.
             grid: the map from now on, where it has changed.
 
         Returns:
@@ -113,13 +116,15 @@ class Replanner:
         """Return whether the heat map is worth to be sampled from another start."""
         if self.heatmap is None or self._last is None:
             return False
-        grid = self.grid.inflated(self._options.get("radius", 0.0))
+        robot = robot_of(self._options.get("robot"), self._options.get("radius", 0.0))
+        grid = Workspace(self.grid, robot).grid
         before = self.heatmap.grid
         if grid is not before and (
             _frame(grid) != _frame(before) or (self.heatmap.region & ~grid.free).any()
         ):
             return False
-        return self.heatmap.connects(start, self._last.goal)
+        position = check_pose("start", start)[:2] if robot.has_heading else start
+        return self.heatmap.connects(position, self._last.goal[:2])
 
 
 def _frame(grid: GridMap) -> tuple[object, ...]:

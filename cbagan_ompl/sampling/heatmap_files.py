@@ -11,7 +11,7 @@ from numpy.lib import format as npy_format
 from numpy.typing import NDArray
 
 from ..common.files import open_regular, read_bytes, reason
-from ..errors import CbaganOmplError, HeatmapError, show
+from ..errors import HeatmapError, show
 from ..maps.image_files import decode_pixels
 from .colour_pictures import has_colours, read_green_region
 
@@ -38,11 +38,8 @@ def read_heatmap_values(path: Path, shape: tuple[int, int]) -> NDArray[Any]:
         return _read_array(path, shape)
     height, width = shape
     data = read_bytes(path, HeatmapError, _MOST_BYTES_PER_PIXEL * height * width + _OVERHEAD)
-    try:
-        pixels, white = decode_pixels(data, str(path))
-    except CbaganOmplError as error:
-        raise HeatmapError(f"cannot read the heat map {error}") from error
-    _check_shape(path, pixels.shape[:2], shape)
+    name = f"cannot read the heat map {path}"
+    pixels, white = decode_pixels(data, name, HeatmapError, (width, height))
     if has_colours(pixels):
         return read_green_region(pixels, white, str(path))
     gray = pixels if pixels.ndim == 2 else pixels[..., 0]
