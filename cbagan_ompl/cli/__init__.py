@@ -83,6 +83,15 @@ def execute(args: argparse.Namespace) -> int:
         return status
 
 
+def _resume_hint(args: argparse.Namespace) -> str:
+    """Return what to say of ``--resume`` after an interrupt."""
+    if not hasattr(args, "resume"):
+        return ""
+    if hasattr(args, "can_resume") and not args.can_resume(args):
+        return " before anything was kept; begin again with the same command"
+    return "; go on with the same command and --resume"
+
+
 @contextmanager
 def _printed_warnings(command: str) -> Iterator[None]:
     """Print each warning of this package once, in one line, whatever filters Python was given."""
@@ -100,15 +109,6 @@ def _printed_warnings(command: str) -> Iterator[None]:
 
         warnings.showwarning = show_warning
         yield
-
-
-def _resume_hint(args: argparse.Namespace) -> str:
-    """Return what to say of ``--resume`` after an interrupt."""
-    if not hasattr(args, "resume"):
-        return ""
-    if hasattr(args, "can_resume") and not args.can_resume(args):
-        return " before anything was kept; begin again with the same command"
-    return "; go on with the same command and --resume"
 
 
 def _explain(error: Exception) -> tuple[int, str]:

@@ -77,7 +77,7 @@ def follow_path(
     if not len(path):
         return path
     if not workspace.robot.has_heading:
-        return _divide_segments(path, step)
+        return divide_segments(path, step)
     space = setup.getStateSpace()
     states = [workspace.make_state(space, endpoint) for endpoint in path]
     passed = compat.new_state(space)
@@ -91,8 +91,20 @@ def follow_path(
     return np.array(points)
 
 
-def _divide_segments(path: NDArray[np.float64], step: float) -> NDArray[np.float64]:
-    """Return what :func:`follow_path` does where motions are segments in the plane."""
+def divide_segments(path: NDArray[np.float64], step: float) -> NDArray[np.float64]:
+    """Return points along a polyline, its corners among them.
+
+    Args:
+        path: corners, (N, 2), world.
+        step: the longest distance between two points, world units.
+
+    Returns:
+        (M, 2), world; each segment is divided into equal steps.
+
+    Example:
+        >>> divide_segments(np.array([[0.0, 0.0], [0.0, 1.0]]), 0.5).tolist()
+        [[0.0, 0.0], [0.0, 0.5], [0.0, 1.0]]
+    """
     moves = np.diff(path, axis=0)
     counts = np.ceil(np.hypot(*moves.T) / step).astype(int).clip(1)
     # Of each point: its segment, and which step of it.

@@ -121,7 +121,7 @@ def plan(
     if not isinstance(grid, GridMap | str | PathLike):
         raise MapError(f"grid is a GridMap or the file of a map, got {show(grid)}")
     source = grid if isinstance(grid, GridMap) else GridMap.load(grid)
-    workspace = Workspace(source, robot_of(robot, radius))
+    workspace = Workspace(source, _robot_of(robot, radius))
     moves: Moves = {}
     distance = finite_number("snap", snap, 0.0)
     if distance > 0:
@@ -175,13 +175,8 @@ class _Job:
     keep_tree: bool
 
 
-def robot_of(robot: Robot | None, radius: float) -> Robot:
-    """Return the robot that the options ``robot`` and ``radius`` of :func:`plan` mean.
-
-    Raises:
-        RobotError: no robot, or both.
-        MapError: a radius that is none.
-    """
+def _robot_of(robot: Robot | None, radius: float) -> Robot:
+    """Return the robot that is meant by both options."""
     if robot is not None and not isinstance(robot, Robot):
         raise RobotError(
             f"robot is a Robot, such as Robot.rectangle(length, width), got {show(robot)}"

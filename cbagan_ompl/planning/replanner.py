@@ -14,7 +14,7 @@ from ..maps.grid_map import GridMap
 from ..robots.poses import check_pose
 from ..sampling.heatmap import Heatmap
 from .heatmap_sources import LEARNED, heatmap_source, loaded_model
-from .plan import plan, robot_of
+from .plan import plan
 from .plan_result import PlanResult
 from .workspace import Workspace
 
@@ -38,14 +38,13 @@ class Replanner:
 
     Args:
         grid: the map.
-        goal: (x, y), world; (x, y, yaw) for a robot with heading.
+        goal: (x, y), world.
         planner: see :func:`cbagan_ompl.plan`; the default stops at its first path.
         sampler: see there.
         model: for the learned sampler, a loaded model or the file of one, which is loaded here,
             once; the bundled model by default.
-        **options: of every plan, as keyword arguments of :func:`cbagan_ompl.plan`: ``robot``,
-            ``radius``, ``time``, ``range``... With a ``seed`` the n-th plan, from 0, has
-            ``seed + n``.
+        **options: of every plan, as keyword arguments of :func:`cbagan_ompl.plan`: ``radius``,
+            ``time``, ``range``... With a ``seed`` the n-th plan has ``seed + n``, from 0.
 
     Raises:
         MapError: ``grid`` is no map.
@@ -88,7 +87,7 @@ class Replanner:
         """Plan from a start to the goal.
 
         Args:
-            start: (x, y) or (x, y, yaw), world: where the robot is.
+            start: (x, y), world, or (x, y, yaw) for a robot with heading: where the robot is.
             grid: the map from now on, where it has changed.
 
         Returns:
@@ -116,14 +115,14 @@ class Replanner:
         """Return whether the heat map is worth to be sampled from another start."""
         if self.heatmap is None or self._last is None:
             return False
-        robot = robot_of(self._options.get("robot"), self._options.get("radius", 0.0))
-        grid = Workspace(self.grid, robot).grid
+        grid = Workspace(self.grid, self._last.robot).grid
         before = self.heatmap.grid
         if grid is not before and (
             _frame(grid) != _frame(before) or (self.heatmap.region & ~grid.free).any()
         ):
             return False
-        position = check_pose("start", start)[:2] if robot.has_heading else start
+        has_heading = self._last.robot.has_heading
+        position = check_pose("start", start)[:2] if has_heading else start
         return self.heatmap.connects(position, self._last.goal[:2])
 
 

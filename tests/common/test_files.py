@@ -65,7 +65,7 @@ UNREADABLE: list[tuple[Callable[[Path], Path], str]] = [
     (lambda _: Path("/dev/zero"), "it is a device or a pipe, not a file"),
     (lambda _: Path("/dev/full"), "it is a device or a pipe, not a file"),
     (lambda folder: folder / ("x" * 300), "File name too long"),
-    (lambda folder: folder / "a\0b", "embedded null byte"),
+    (lambda folder: folder / "a\0b", "embedded null"),
     (lambda folder: folder / "none" / "a", "No such file or directory"),
 ]
 
@@ -155,7 +155,7 @@ def test_what_is_no_text(tmp_path: Path, data: bytes) -> None:
 def test_reasons() -> None:
     assert reason(OSError(28, "No space left on device", "/x")) == "No space left on device"
     assert reason(OSError("odd")) == "odd"
-    assert reason(ValueError("embedded null byte")) == "embedded null byte"
+    assert reason(ValueError("embedded null")) == "embedded null byte"
     assert reason(KeyError("a")) == "'a'"
 
 
@@ -223,7 +223,7 @@ UNWRITABLE: list[tuple[Callable[[Path], Path], str]] = [
     (lambda _: Path("/dev/null"), "it is a device or a pipe, not a file"),
     (lambda folder: folder / "none" / "a", "No such file or directory"),
     (lambda folder: folder / ("x" * 300), "File name too long"),
-    (lambda folder: folder / "a\0b", "null byte"),
+    (lambda folder: folder / "a\0b", "embedded null"),
 ]
 
 
