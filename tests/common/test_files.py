@@ -155,7 +155,7 @@ def test_what_is_no_text(tmp_path: Path, data: bytes) -> None:
 def test_reasons() -> None:
     assert reason(OSError(28, "No space left on device", "/x")) == "No space left on device"
     assert reason(OSError("odd")) == "odd"
-    assert reason(ValueError("embedded null")) == "embedded null byte"
+    assert reason(ValueError("embedded null byte")) == "embedded null byte"
     assert reason(KeyError("a")) == "'a'"
 
 
