@@ -10,6 +10,7 @@ from typing import Any
 
 from ..errors import PlannerError
 from ..sampling.adaptation import AdaptiveMixture
+from ..sampling.headings import HeadingSampler
 from ..sampling.heatmap import Heatmap, check_heatmap
 from ..sampling.options import OPTIMIZING_SHARPNESS, SamplerOptions
 from ..sampling.sampler import HeatmapSampler
@@ -28,7 +29,8 @@ from .hooks import (
     stops_at_first,
 )
 from .monitor import PlannerMonitor, is_informed, release_forgotten
-from .states import StateAccess, position_bounds, state_access
+from .pose_headings import with_headings
+from .states import StateAccess, drives_backwards, position_bounds, state_access
 
 # OMPL's range of a planner that was given none, as a fraction of the extent of the space.
 _OMPL_RANGE = 0.2
@@ -46,10 +48,12 @@ class Attachment:
         >>> from ompl import geometric as og, util as ou
         >>> from cbagan_ompl import GridMap, Heatmap, tasks_of
         >>> from cbagan_ompl.planning.problem import make_setup
+        >>> from cbagan_ompl.planning.workspace import Workspace
         >>> ou.setLogLevel(ou.LOG_NONE)
         >>> grid = GridMap.load("bundled:maze")
         >>> task = tasks_of("bundled:maze", grid)[0]
-        >>> setup = make_setup(grid, grid.check_task(task.start, task.goal), tolerance=1.0)
+        >>> endpoints = grid.check_task(task.start, task.goal)
+        >>> setup = make_setup(Workspace(grid), endpoints, tolerance=1.0)
         >>> setup.setPlanner(og.RRTstar(setup.getSpaceInformation()))
         >>> attachment = attach(setup, Heatmap.uniform(grid))
         >>> attachment.hook, attachment.sample_counts
@@ -161,10 +165,12 @@ def attach(
         >>> from ompl import base as ob, geometric as og, util as ou
         >>> from cbagan_ompl import GridMap, GridValidityChecker, Heatmap, tasks_of
         >>> from cbagan_ompl.planning.problem import make_setup
+        >>> from cbagan_ompl.planning.workspace import Workspace
         >>> ou.setLogLevel(ou.LOG_NONE)
         >>> grid = GridMap.load("bundled:rooms")
         >>> task = tasks_of("bundled:rooms", grid)[0]
-        >>> setup = make_setup(grid, grid.check_task(task.start, task.goal), tolerance=1.0)
+        >>> endpoints = grid.check_task(task.start, task.goal)
+        >>> setup = make_setup(Workspace(grid), endpoints, tolerance=1.0)
         >>> setup.setPlanner(og.RRT(setup.getSpaceInformation()))
         >>> with attach(setup, Heatmap.corridor(grid, task.start, task.goal), seed=0) as attachment:
         ...     _ = setup.solve(5.0)
@@ -182,9 +188,11 @@ def attach(
         options = replace(options, sharpness=sharpness)
     rng = options.generator()
     space = setup.getStateSpace()
-    states = state_access(space, rng)
     release_forgotten()
-    check_task(setup, heatmap, states)
+    check_task(setup, heatmap, state_access(space))
+    heatmap = with_headings(setup, heatmap, options.heading)
+    headings = HeadingSampler(heatmap, options.heading, rng, drives_backwards(space))
+    states = state_access(space, headings)
     injects = hook == GOAL_INJECTION
     monitor = (goal_monitor if injects else PlannerMonitor)(setup, states)
     mixture = None

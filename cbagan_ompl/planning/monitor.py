@@ -20,7 +20,7 @@ from ..sampling.informed_set import InformedSet
 from .compat import best_cost, new_state, ob, planner_data, start_states, typed_state
 from .solution_cost import SolutionCost
 from .solve_watch import SolveWatch
-from .states import StateAccess
+from .states import StateAccess, is_distance_bound
 
 # A goal region without end is represented by this many samples of it in the informed set.
 _MAX_GOALS = 100
@@ -105,11 +105,13 @@ class PlannerMonitor:
     def informed_set(self) -> InformedSet | None:
         """Return the informed set of the task, once the planner has begun to plan.
 
-        It is None for planners that are not informed, and where costs are no path lengths.
+        It is None for planners that are not informed, and where costs are no path lengths, or
+        lengths that may be below those of the positions: these are the lower bound.
         """
         objective = self._problem.getOptimizationObjective()
         is_length = isinstance(objective, ob.PathLengthOptimizationObjective)
-        return self._endpoints() if self._is_informed and is_length else None
+        is_bounded = is_length and is_distance_bound(self._setup.getStateSpace())
+        return self._endpoints() if self._is_informed and is_bounded else None
 
     def connects(self, heatmap: Heatmap) -> bool:
         """Return whether a region connects a start with a goal, once planning has begun."""

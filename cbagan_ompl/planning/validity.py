@@ -9,6 +9,8 @@ from ..errors import PlannerError
 from ..maps.checks import check_grid
 from ..maps.collision import segment_is_free
 from ..maps.grid_map import GridMap
+from ..robots.robot import Robot
+from ..robots.shape_checker import ShapeChecker
 from .compat import ob
 from .states import StateAccess, space_of, state_access
 
@@ -41,6 +43,9 @@ class GridValidityChecker(ob.StateValidityChecker):  # type: ignore[misc]
         super().__init__(si)
         self._cells, self._width, self._height = grid.cells, grid.width, grid.height
         self._affine = tuple(grid.pixel_from_world)
+        self._grid = grid
+        # Made when first asked for the clearance.
+        self._checker: ShapeChecker | None = None
 
     def isValid(self, state: Any) -> bool:  # noqa: N802
         """Return whether a state is valid: a real ``bool``, as OMPL 2.0 demands."""
@@ -51,6 +56,15 @@ class GridValidityChecker(ob.StateValidityChecker):  # type: ignore[misc]
         if not (0 <= u < self._width and 0 <= v < self._height):
             return False
         return self._cells[floor(v) * self._width + floor(u)] == 1
+
+    def clearance(self, state: Any) -> float:
+        """Return the distance from a state to the nearest blocked pixel, world units.
+
+        It is 0 in an invalid state, and infinite on a map without obstacles, whose border is none.
+        """
+        if self._checker is None:
+            self._checker = ShapeChecker.of(self._grid, Robot.point())
+        return self._checker.clearance(*self._read(state), 0.0)
 
 
 class GridMotionValidator(ob.MotionValidator):  # type: ignore[misc]

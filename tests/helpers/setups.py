@@ -10,6 +10,7 @@ from cbagan_ompl import GridMap, Heatmap
 from cbagan_ompl.planning import compat
 from cbagan_ompl.planning.compat import og
 from cbagan_ompl.planning.problem import make_setup
+from cbagan_ompl.planning.workspace import Workspace
 
 SMALL_START, SMALL_GOAL, TOLERANCE = (5.5, 5.5), (58.2, 58.3), 1.0
 
@@ -23,7 +24,7 @@ def small_walls() -> GridMap:
 
 
 def small_setup(grid: GridMap, planner: str) -> Any:
-    setup = make_setup(grid, grid.check_task(SMALL_START, SMALL_GOAL), TOLERANCE)
+    setup = make_setup(Workspace(grid), grid.check_task(SMALL_START, SMALL_GOAL), TOLERANCE)
     setup.setPlanner(getattr(og, planner)(setup.getSpaceInformation()))
     return setup
 
