@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cbagan_ompl import GridMap, Heatmap
 from cbagan_ompl.planning import compat
@@ -37,3 +38,8 @@ def solve_for(solver: Any, iterations: int) -> Any:
     """Let a setup or a planner solve for some evaluations of its termination condition."""
     count = iter(range(iterations))
     return solver.solve(compat.termination_condition(lambda: next(count, None) is None))
+
+
+def path_positions(path: Any) -> NDArray[np.float64]:
+    """The positions of a geometric path in the plane, (N, 2)."""
+    return np.array([(state[0], state[1]) for state in path.getStates()])

@@ -11,6 +11,7 @@ from helpers.setups import (
     SMALL_GOAL,
     SMALL_START,
     TOLERANCE,
+    path_positions,
     small_heatmap,
     small_setup,
     small_walls,
@@ -56,7 +57,7 @@ def bare_planner(name: str) -> Any:
 
 
 def path_end(problem: Any) -> np.ndarray:
-    return compat.path_positions(problem.getSolutionPath())[-1]
+    return path_positions(problem.getSolutionPath())[-1]
 
 
 @pytest.mark.parametrize("name", [n for n in reached_planners() if not n.startswith("SPARS")])

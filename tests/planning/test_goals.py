@@ -10,6 +10,7 @@ from helpers.setups import (
     SMALL_GOAL,
     SMALL_START,
     TOLERANCE,
+    path_positions,
     small_heatmap,
     small_setup,
     small_walls,
@@ -39,7 +40,7 @@ def make_state(setup: Any, point: tuple[float, float]) -> Any:
 
 
 def path_end(setup: Any) -> np.ndarray:
-    return compat.path_positions(setup.getSolutionPath())[-1]
+    return path_positions(setup.getSolutionPath())[-1]
 
 
 @pytest.mark.parametrize("planner", INJECTED)
@@ -97,7 +98,7 @@ def test_a_new_start_is_served(planner: str) -> None:
         setup.getProblemDefinition().clearStartStates()
         setup.addStartState(make_state(setup, NEW_START))
         assert compat.is_exact(solve_for(setup, 3000))
-        assert compat.path_positions(setup.getSolutionPath())[0].tolist() == list(NEW_START)
+        assert path_positions(setup.getSolutionPath())[0].tolist() == list(NEW_START)
 
 
 @pytest.mark.parametrize("planner", INJECTED)

@@ -55,7 +55,16 @@ def test_the_heat_map_is_the_largest_of_those_of_each_goal() -> None:
 
 def test_poses_as_goals() -> None:
     goals = [(58.5, 58.5, 0.0), (58.5, 8.5, 1.5)]
-    result = run(goals, "RRT", robot=Robot.rectangle(4, 2), iterations=5000, time=20.0)
+    result = plan(
+        GRID,
+        (*START, 0.0),
+        goals,
+        "RRT",
+        "corridor",
+        robot=Robot.rectangle(4, 2),
+        time=20.0,
+        seed=1,
+    )
     assert result.solved
     assert result.goal.tolist() in [list(goal) for goal in goals]
     assert result.path.shape[1] == 3
