@@ -62,7 +62,13 @@ def _add_task(task: Any) -> None:
         metavar="X,Y[,YAW]",
         help="where the path begins; with a yaw, in radians, for robots with heading",
     )
-    task.add_argument("--goal", type=endpoint, metavar="X,Y[,YAW]", help="where it ends")
+    task.add_argument(
+        "--goal",
+        type=endpoint,
+        action="append",
+        metavar="X,Y[,YAW]",
+        help="where it ends; given several times, at whichever of them",
+    )
     task.add_argument(
         "--task",
         type=int,
@@ -172,7 +178,7 @@ def _plan(args: argparse.Namespace) -> int:
 
 def _endpoints(
     args: argparse.Namespace, grid: GridMap, robot: Robot
-) -> tuple[tuple[float, ...], tuple[float, ...]]:
+) -> tuple[tuple[float, ...], tuple[float, ...] | list[tuple[float, ...]]]:
     if args.start is not None and args.goal is not None and args.task is None:
         return args.start, args.goal
     if args.start is not None or args.goal is not None:
