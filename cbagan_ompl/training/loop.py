@@ -21,7 +21,8 @@ from ..datasets.dataset import Tasks
 from ..errors import ConfigError, show
 from ..inference.model_files import translate_damage
 from .batches import Batch, check_trainable, encode, make_batch, scale_down
-from .checkpoints import BEST, LAST, SCHEMA, best_generator, load_checkpoint, save_checkpoint
+from .checkpoint_files import BEST, LAST
+from .checkpoints import SCHEMA, best_generator, load_checkpoint, save_checkpoint
 from .config import TrainingConfig
 from .distributed import ProcessGroup, pick_device, process_group
 from .gan import Gan
