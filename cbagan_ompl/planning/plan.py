@@ -16,12 +16,21 @@ from ..common.validation import finite_number, positive_number, truth_value, who
 from ..errors import ConfigError, MapError, show
 from ..maps.endpoints import Moves, snap_endpoints
 from ..maps.grid_map import GridMap
+from ..maps.grid_search import search_kind
 from ..sampling.heatmap import Heatmap
 from ..sampling.options import SamplerOptions
 from . import compat
 from .attach import Attachment, attach
 from .compat import ou
-from .heatmap_sources import LEARNED, UNIFORM, HeatmapSource, heatmap_source
+from .heatmap_sources import (
+    AUTO,
+    CORRIDOR,
+    LEARNED,
+    UNIFORM,
+    HeatmapSource,
+    heatmap_source,
+    resolve_sampler,
+)
 from .hooks import check_planner, hangs_at_optimum
 from .plan_result import PlanResult
 from .planner_names import planner_name
@@ -69,7 +78,7 @@ def plan(
         planner: a geometric planner by OMPL's name, such as ``"RRT"`` or ``"InformedRRTstar"``, or
             as the literature writes it, ``"RRT*"``, ``"RRT-Connect"``...
         sampler: one of :data:`cbagan_ompl.planning.heatmap_sources.SAMPLERS`; ``"uniform"`` leaves
-            OMPL's own sampler in place.
+            OMPL's own sampler in place. What ``"auto"`` chose is the ``sampler`` of the result.
         time: limit of the planner's solve, seconds. RRT-like planners stop at their first
             solution, RRT*-like ones go on to the limit.
         iterations: limit of the planner's iterations, whichever comes first.
@@ -78,7 +87,7 @@ def plan(
         radius: of the robot, world units; obstacles are inflated by it.
         snap: how far a start or goal in an obstacle, in the margin around one, or in unknown space
             is moved at most, to the nearest place where the robot may be, world units.
-        model: for the learned sampler, a loaded model or the file of one; the bundled model by
+        model: for the learned sampler (or auto), a loaded model or the file of one; the bundled model by
             default.
         heatmap: to be sampled in place of the learned one: of this map, or an array (H, W) as
             :class:`Heatmap` takes it.
@@ -123,6 +132,9 @@ def plan(
     options, seed = _with_seed(SamplerOptions.of(options, changes))
     planner = planner_name(planner)
     check_planner(planner, follows_heatmap=sampler != UNIFORM)
+    if sampler == AUTO and heatmap is None:
+        sampler = resolve_sampler(sampler, space_map)
+        model = model if sampler == LEARNED else None
     name, make_heatmap = heatmap_source(sampler, model, heatmap)
     job = _Job(
         map_name=source.name,
@@ -231,6 +243,7 @@ def _result(
         status=run.status,
         planner=job.planner,
         sampler=job.sampler,
+        grid_search=search_kind() if job.sampler in (CORRIDOR, LEARNED) else None,
         hook=attachment.hook if attachment else None,
         ompl_version=compat.ompl_version(),
         seed=job.seed,

@@ -14,7 +14,7 @@ from ..errors import HeatmapError, show
 from ..maps.connectivity import in_one_component
 from ..maps.endpoints import check_point
 from ..maps.grid_map import GridMap
-from ..maps.grid_search import pull_taut, shortest_path
+from ..maps.grid_search import COMPILED, SCIPY, pull_taut, search_kind, shortest_path
 from .bands import half_width, paint_band
 from .heatmap_files import read_heatmap_values
 from .pixels import pixel_pair, sample_in_pixels, sample_pixels
@@ -30,8 +30,8 @@ _BRIDGE_FRACTION = 0.015
 # Most points that one call of Heatmap.sample gives: about a gigabyte on the way.
 _MOST_SAMPLES = 10**7
 
-# Longest side of the coarse grid in which bridges are looked for.
-_REPAIR_SIZE = 64
+# Longest side of the coarse grid in which bridges are looked for, by what searches.
+_REPAIR_SIZES = {COMPILED: 128, SCIPY: 64}
 
 # Cost of a pixel length inside the region, relative to one where the heat map is 0.
 _REGION_COST = 0.02
@@ -228,7 +228,8 @@ class Heatmap:
         if self.connects(start, goal):
             return self
         cost = np.where(self.region, np.float32(_REGION_COST), 1 + _REGION_COST - self.values)
-        pixels = shortest_path(self.grid.free, *pixel_pair(endpoints), cost, _REPAIR_SIZE)
+        coarse_size = _REPAIR_SIZES[search_kind()]
+        pixels = shortest_path(self.grid.free, *pixel_pair(endpoints), cost, coarse_size)
         assert pixels is not None, "check_task has made sure that a path exists"
         bridge = paint_band(
             self.grid.shape, pixels + np.float64(0.5), half_width(self.grid, _BRIDGE_FRACTION)
