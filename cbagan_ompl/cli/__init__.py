@@ -67,8 +67,9 @@ def execute(args: argparse.Namespace) -> int:
         return NO_READER
     except KeyboardInterrupt as error:
         is_terminated = isinstance(error, Terminated)
-        hint = "; go on with the same command and --resume" if hasattr(args, "resume") else ""
-        print(("terminated" if is_terminated else "interrupted") + hint, file=sys.stderr)
+        print(
+            ("terminated" if is_terminated else "interrupted") + _resume_hint(args), file=sys.stderr
+        )
         return TERMINATED if is_terminated else INTERRUPTED
     except Exception as error:
         if args.debug:
@@ -76,6 +77,15 @@ def execute(args: argparse.Namespace) -> int:
         status, text = _explain(error)
         print(f"cbagan-ompl {args.command}: {text}", file=sys.stderr)
         return status
+
+
+def _resume_hint(args: argparse.Namespace) -> str:
+    """Return what to say of ``--resume`` after an interrupt."""
+    if not hasattr(args, "resume"):
+        return ""
+    if hasattr(args, "can_resume") and not args.can_resume(args):
+        return " before anything was kept; begin again with the same command"
+    return "; go on with the same command and --resume"
 
 
 def _explain(error: Exception) -> tuple[int, str]:

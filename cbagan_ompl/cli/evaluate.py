@@ -52,7 +52,8 @@ def add_evaluate_parser(commands: Any) -> None:
         "--model",
         action="append",
         metavar="FILE",
-        help="exported model; may be repeated (default: the bundled one)",
+        help="exported model, or the name of a bundled one; may be repeated (default: the default "
+        "model)",
     )
     parser.add_argument(
         "--predictions",
@@ -97,6 +98,8 @@ def _evaluate(args: argparse.Namespace) -> int:
     models = [load_model(path) for path in args.model or [None]]
     names = [str(model.record["name"]) for model in models] + [name for name, _ in stored]
     dataset = load_dataset(args.dataset)
+    # Before the models are evaluated, which takes a while.
+    regions = [load_predictions(path, Path(args.dataset), args.split) for _, path in stored]
     tasks = dataset.test if args.split == "test" else dataset.train
     baselines = trivial_baselines(tasks)
     _check_names([*names, *baselines])
@@ -112,8 +115,8 @@ def _evaluate(args: argparse.Namespace) -> int:
             for name, model in zip(names, models, strict=False)
         ),
         *(
-            evaluator.evaluate(name, load_predictions(folder, Path(args.dataset), args.split))
-            for name, folder in stored
+            evaluator.evaluate(name, predicted)
+            for (name, _), predicted in zip(stored, regions, strict=True)
         ),
         *(evaluator.evaluate(name, regions) for name, regions in baselines.items()),
     ]

@@ -22,6 +22,7 @@ from .options import (
     map_options,
     sampler_options,
 )
+from .robot_options import add_robot_options, endpoint, robot_of
 
 _PLAN_HELP = """\
 Plan a path on a map with one of OMPL's planners.
@@ -49,23 +50,26 @@ def add_plan_parser(commands: Any) -> None:
     parser.set_defaults(run=_plan)
     parser.add_argument("map", metavar="MAP", help="map file, or bundled:NAME")
     _add_task(parser.add_argument_group("task"))
+    add_robot_options(parser.add_argument_group("robot", "what moves; a point by default"))
     _add_planner(parser.add_argument_group("planner"))
     _add_sampler(parser.add_argument_group("sampler"))
     _add_output(parser.add_argument_group("output"))
 
 
 def _add_task(task: Any) -> None:
-    task.add_argument("--start", type=_point, metavar="X,Y", help="where the path begins")
-    task.add_argument("--goal", type=_point, metavar="X,Y", help="where it ends")
+    task.add_argument(
+        "--start",
+        type=endpoint,
+        metavar="X,Y[,YAW]",
+        help="where the path begins; with a yaw, in radians, for robots with heading",
+    )
+    task.add_argument("--goal", type=endpoint, metavar="X,Y[,YAW]", help="where it ends")
     task.add_argument(
         "--task",
         type=int,
         metavar="N",
         help="number of a task that comes with the map, from 0: a bundled map's, or a line of the "
         "MovingAI .scen beside it (default: 0 when no start and goal are given)",
-    )
-    task.add_argument(
-        "--radius", type=float, default=0.0, metavar="R", help="radius of the robot (default: 0)"
     )
     task.add_argument(
         "--snap",
@@ -105,7 +109,11 @@ def _add_sampler(sampler: Any) -> None:
         metavar="NAME",
         help=f"{describe_samplers()} (default: learned)",
     )
-    sampler.add_argument("--model", metavar="FILE", help="exported model (default: the bundled)")
+    sampler.add_argument(
+        "--model",
+        metavar="FILE",
+        help="exported model, or the name of a bundled one such as cbagan",
+    )
     sampler.add_argument(
         "--heatmap",
         metavar="FILE",
@@ -118,17 +126,7 @@ def _add_output(output: Any) -> None:
     output.add_argument("--output", metavar="FILE", help="figure of the plan (.png, .pdf, .svg)")
     output.add_argument("--no-tree", action="store_true", help="leave the tree out of the figure")
     output.add_argument("--json", metavar="FILE", help="result as JSON")
-    output.add_argument("--csv", metavar="FILE", help="way points as a table: x,y,index")
-
-
-def _point(text: str) -> tuple[float, float]:
-    try:
-        x, y = (float(part) for part in text.split(","))
-    except ValueError:
-        raise argparse.ArgumentTypeError(
-            f"expected two numbers as X,Y, such as 12.5,-40; got {text!r}"
-        ) from None
-    return x, y
+    output.add_argument("--csv", metavar="FILE", help="way points as a table: x,y[,yaw],index")
 
 
 def _plan(args: argparse.Namespace) -> int:
@@ -151,7 +149,7 @@ def _plan(args: argparse.Namespace) -> int:
         time=args.time,
         iterations=args.iterations,
         range=args.range,
-        radius=args.radius,
+        robot=robot_of(args),
         snap=args.snap,
         model=args.model,
         heatmap=None if args.heatmap is None else Heatmap.load(args.heatmap, grid),
@@ -174,7 +172,7 @@ def _plan(args: argparse.Namespace) -> int:
 
 def _endpoints(
     args: argparse.Namespace, grid: GridMap
-) -> tuple[tuple[float, float], tuple[float, float]]:
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
     if args.start is not None and args.goal is not None and args.task is None:
         return args.start, args.goal
     if args.start is not None or args.goal is not None:

@@ -26,7 +26,7 @@ LEARNED = "learned"
 #: The sampler of a grid search.
 CORRIDOR = "corridor"
 
-#: Whichever of the two makes its heat map sooner on a map, see :func:`quicker_sampler`.
+#: Whichever of the two makes its heat map sooner on a map, see :func:`resolve_auto`.
 AUTO = "auto"
 
 #: Every sampler by its name, with what it samples.
@@ -49,21 +49,20 @@ OWN_HEATMAP = "heatmap"
 HeatmapSource = Callable[[GridMap, ArrayLike, ArrayLike], Heatmap]
 
 
-def resolve_sampler(sampler: str, grid: GridMap) -> str:
-    """Return the sampler that :data:`AUTO` stands for on a map; others as they are.
+def is_auto(sampler: object) -> bool:
+    """Return whether a sampler is :data:`AUTO`, and :func:`resolve_auto` has to be asked."""
+    return isinstance(sampler, str) and sampler == AUTO
+
+
+def resolve_auto(grid: GridMap) -> str:
+    """Return the sampler that :data:`AUTO` stands for on a map.
 
     That is the corridor on maps up to a size, and where torch is not installed; else learned.
 
-    Args:
-        sampler: one of :data:`SAMPLERS`.
-        grid: the map.
-
     Example:
-        >>> resolve_sampler("auto", GridMap.load("bundled:maze").inflated(0))
+        >>> resolve_auto(GridMap(np.ones((64, 64), bool)))
         'corridor'
     """
-    if sampler != AUTO:
-        return sampler
     is_small = grid.free.size <= _MOST_CORRIDOR_PIXELS[search_kind()]
     return CORRIDOR if is_small or find_spec("torch") is None else LEARNED
 
@@ -78,7 +77,7 @@ def heatmap_source(
     A model is loaded here, once, and so is the grid search.
 
     Args:
-        sampler: one of :data:`SAMPLERS`, but for ``"auto"``: see :func:`resolve_sampler`.
+        sampler: one of :data:`SAMPLERS`, but for ``"auto"``: see :func:`resolve_auto`.
         model: for the learned sampler, a loaded model or the file of one; the bundled model by
             default.
         heatmap: to be sampled in place of the learned one.

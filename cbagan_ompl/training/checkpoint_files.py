@@ -11,9 +11,7 @@ from ..inference.archives import Archive
 from ..inference.model_files import translate_damage
 from ..inference.tensor_pickles import check_group
 from ..networks.config import MAX_WEIGHTS
-
-#: Names of the checkpoints of a run: of its last epoch, and of its best one.
-LAST, BEST = "last.pt", "best.pt"
+from .config import BEST, LAST
 
 #: Largest checkpoint: six numbers for each weight (the weight, its average in the generator, two
 #: moments of the optimiser), and as much again for the log.

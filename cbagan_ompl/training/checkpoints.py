@@ -24,7 +24,8 @@ from .config import TrainingConfig
 SCHEMA = 4
 
 _SCORES = dict.fromkeys(("iou", "dice", "precision", "recall", "connectivity"), float)
-_NETWORKS = ("generator", "map_discriminator", "point_discriminator", "average")
+_GENERATORS = ("generator", "average")
+_DISCRIMINATORS = ("map_discriminator", "point_discriminator")
 _SYNTHETIC = {
     "seed": int,
     "hard_fraction": float,
@@ -43,7 +44,7 @@ _FORM: dict[str, Any] = {
         "train_tasks": int,
         "test_tasks": int,
     },
-    "gan": {name: {} for name in (*_NETWORKS, "optimizers")},
+    "gan": {name: {} for name in (*_GENERATORS, "optimizers")},
     "rng": str,
     "noise_rng": torch.Tensor,
     "history": [{"epoch": int, "losses": {}, "validation": _SCORES}],
@@ -114,7 +115,10 @@ def best_generator(
 
 
 def _check_form(state: dict[str, Any], path: Path) -> None:
-    form = dict(_FORM)
+    form, networks = dict(_FORM), [*_GENERATORS]
+    if isinstance(state.get("config"), dict) and state["config"].get("adversarial_weight", 1):
+        networks += _DISCRIMINATORS
+        form["gan"] = form["gan"] | {name: {} for name in _DISCRIMINATORS}
     if state.get("test") is not None:
         form |= {"test": _SCORES, "trivial": {}}
     wrong = _find_mismatch(state, form)
@@ -124,7 +128,7 @@ def _check_form(state: dict[str, Any], path: Path) -> None:
         wrong = _find_mismatch(state["trivial"], dict.fromkeys(state["trivial"], _SCORES))
     if wrong is not None:
         raise ModelError(f"{path}: damaged, its entry {wrong} is missing or of another kind")
-    for name in _NETWORKS:
+    for name in networks:
         for key, weights in state["gan"][name].items():
             if not isinstance(weights, torch.Tensor) or not torch.isfinite(weights).all():
                 raise ModelError(f"{path}: damaged, the weights {show(key)} are not finite numbers")
