@@ -17,6 +17,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from search_speed import speed_table
+
 from cbagan_ompl.common.files import make_folder, write_atomically
 from cbagan_ompl.common.markdown import table
 
@@ -339,6 +341,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "paper_tables": paper_tables,
     "paper_tasks": paper_tasks,
     "bundled_maps": bundled_maps,
+    "search_speed": lambda: speed_table(read("search_speed.json")),
 }
 
 

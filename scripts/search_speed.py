@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -21,7 +21,7 @@ from unittest.mock import patch
 import numpy as np
 
 from cbagan_ompl import GridMap, Heatmap, load_model
-from cbagan_ompl.benchmarking.tasks import random_tasks
+from cbagan_ompl.common.markdown import table
 from cbagan_ompl.map_generators import MAP_GENERATORS
 from cbagan_ompl.maps import grid_search
 from cbagan_ompl.maps.grid_search import COMPILED, SCIPY, prepare_search, pull_taut, shortest_path
@@ -42,16 +42,22 @@ def main() -> None:
     for size in args.sizes:
         times: list[dict[str, float]] = []
         for seed, name in enumerate(GENERATORS):
-            free = MAP_GENERATORS[name](np.random.default_rng(seed), size, size)
-            grid = GridMap(free, name=name)
-            times += [
-                measure(grid, (task.start, task.goal), model)
-                for task in random_tasks(grid, args.tasks, seed)
-            ]
+            rng = np.random.default_rng(seed)
+            grid = GridMap(MAP_GENERATORS[name](rng, size, size), name=name)
+            times += [measure(grid, make_task(grid, rng), model) for _ in range(args.tasks)]
         result["sizes"][str(size)] = summarize(times)
         print_rows(size, result["sizes"][str(size)])
     if args.json:
         Path(args.json).write_text(json.dumps(result, indent=1) + "\n")
+
+
+def make_task(grid: GridMap, rng: np.random.Generator) -> tuple[Any, Any]:
+    """Return a start and a goal at random, at least a third of the side apart."""
+    pixels = np.argwhere(grid.free)[:, ::-1] + 0.5
+    while True:
+        start, goal = rng.choice(pixels, 2)
+        if np.hypot(*(goal - start)) > grid.width / 3:
+            return start, goal
 
 
 def measure(grid: GridMap, task: tuple[Any, Any], model: Any) -> dict[str, float]:
@@ -103,6 +109,19 @@ def summarize(times: list[dict[str, float]]) -> dict[str, Any]:
     }
     learned = float(np.median([t["learned"] / t[f"corridor {COMPILED}"] for t in times]))
     return {"ms": medians, "scipy_to_compiled": ratios, "learned_to_corridor": learned}
+
+
+def speed_table(result: Mapping[str, Any]) -> str:
+    """Return the figures as Markdown; ``result`` is what ``--json`` writes."""
+    head = ["side", "path", "", "corridor", "", "repair", "", "learned", "learned / corridor"]
+    kinds = ["", *("compiled", "SciPy") * len(ROWS), "", ""]
+    rows = [kinds]
+    for size, summary in result["sizes"].items():
+        ms = summary["ms"]
+        cells = [f"{ms[f'{row} {kind}']:.3g}" for row in ROWS for kind in (COMPILED, SCIPY)]
+        ratio = f"{summary['learned_to_corridor']:.2f}"
+        rows.append([f"{size} px", *cells, f"{ms['learned']:.3g}", ratio])
+    return table(head, rows)
 
 
 def print_rows(size: int, summary: dict[str, Any]) -> None:

@@ -143,7 +143,7 @@ def plan(
     planner = planner_name(planner)
     is_plain = isinstance(sampler, str) and sampler == UNIFORM
     check_planner(planner, follows_heatmap=not is_plain)
-    if is_auto(sampler):
+    if is_auto(sampler) and heatmap is None:
         sampler = resolve_auto(source)
         model = None if sampler == CORRIDOR else model
     name, make_heatmap = heatmap_source(sampler, model, heatmap)
