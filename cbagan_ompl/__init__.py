@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from .errors import (
     CbaganOmplError,
+    CbaganOmplWarning,
     ConfigError,
     DatasetError,
     HeatmapError,
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     )
     from .planning.plan import plan
     from .planning.plan_result import PlanResult
+    from .planning.replanner import Replanner
     from .planning.robot_validity import RobotMotionValidator, RobotValidityChecker
     from .planning.validity import GridMotionValidator, GridValidityChecker
     from .plotting import save_figure
@@ -54,6 +56,7 @@ __all__ = [
     "Adaptation",
     "Attachment",
     "CbaganOmplError",
+    "CbaganOmplWarning",
     "ConfigError",
     "DatasetError",
     "GridMap",
@@ -70,6 +73,7 @@ __all__ = [
     "PlanResult",
     "PlannerError",
     "Predictor",
+    "Replanner",
     "Robot",
     "RobotError",
     "RobotMotionValidator",
@@ -98,6 +102,7 @@ _HOMES = {
     "planning.hooks": ("reached_planners",),
     "planning.plan": ("plan",),
     "planning.plan_result": ("PlanResult",),
+    "planning.replanner": ("Replanner",),
     "planning.ompl_samplers": (
         "HeatmapStateSampler",
         "HeatmapValidStateSampler",

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from threading import Lock
 from typing import Any
@@ -45,6 +46,7 @@ _BROKEN = {"AORRTC", "LazyLBTRRT"} | ({"ABITstar", "AITstar", "BITstar"} if BOOS
 _OTHER_SPACES = frozenset({"STRRTstar"})
 
 
+@cache
 def ompl_version() -> str:
     """Return the version of the installed OMPL package; "unknown" for a build without metadata."""
     try:
