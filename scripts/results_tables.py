@@ -16,6 +16,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from planner_tables import RATIOS_WITH_FIRST, Json, planners_table
+from search_speed import speed_table
 
 from cbagan_ompl.common.files import make_folder, write_atomically
 from cbagan_ompl.common.markdown import table
@@ -292,6 +293,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "paper_tasks": paper_tasks,
     "bundled_maps": bundled_maps,
     "replanning": replanning,
+    "search_speed": lambda: speed_table(read("search_speed.json")),
 }
 
 
