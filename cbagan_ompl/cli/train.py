@@ -70,14 +70,16 @@ def add_train_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--start-from",
         metavar="FILE",
-        help="begin with the weights of another run's checkpoint, which this one refines",
+        help="begin with the weights of another run's checkpoint or of an exported model, a file or "
+        "the name of a bundled one such as cbagan-worlds",
     )
     recipe = parser.add_argument_group("recipe, the later overrides the earlier")
     recipe.add_argument(
         "--preset",
         choices=sorted(PRESETS),
         default="best",
-        help="synthetic: what the bundled model was trained with, for images of 256 pixels; best: "
+        help="synthetic: what the bundled model was trained with, for images of 256 pixels; "
+        "refine: what --start-from cbagan-worlds goes on with; best: "
         "the best one for the paper's data; paper: the values of the paper (default: best)",
     )
     recipe.add_argument(

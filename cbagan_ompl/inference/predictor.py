@@ -78,6 +78,7 @@ class Predictor:
     """An exported model, ready to predict.
 
     Attributes:
+        module: the TorchScript module.
         record: what the model file says about itself: ``working_size``, ``metrics``, ``recipe``...
         inference_threads: CPU threads for one prediction. More than one rarely helps at the
             working size, and takes ten times as long where other work has the cores.
@@ -105,7 +106,7 @@ class Predictor:
                 f"{show(record)}; load_model makes one from a file"
             )
         whole_number("working_size", record.get("working_size", 0), 1, MAX_IMAGE_SIZE)
-        self._module = module
+        self.module = module
         self.record = record
         self.inference_threads = 1
 
@@ -222,7 +223,7 @@ class Predictor:
         cells = torch.from_numpy(free.astype(np.float32))[:, None]
         endpoints = (torch.from_numpy(points.astype(np.float32)) for points in (start, goal))
         with own_torch_state(self.inference_threads):
-            values = self._module(cells, *endpoints)
+            values = self.module(cells, *endpoints)
             result: NDArray[np.float32] = values[:, 0].numpy()
         return result
 

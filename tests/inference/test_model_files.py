@@ -149,7 +149,7 @@ def test_bundled_model_of_a_wheel_and_of_a_checkout(
 def test_names_of_bundled_models(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert load_model("cbagan").record["name"] == "cbagan"
     assert model_files.find_model("cbagan-worlds") == model_files.bundled_model()
-    with pytest.raises(ModelError, match="no bundled model 'cbagen': give one of .*cbagan, cb"):
+    with pytest.raises(ModelError, match=r"no bundled model 'cbagen': give one of .*cbagan, cb"):
         load_model("cbagen")
     for path in ("cbagan.pt", "./cbagan", Path("cbagan")):
         assert model_files.find_model(path) == Path(path)
