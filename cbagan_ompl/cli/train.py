@@ -70,8 +70,8 @@ def add_train_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--start-from",
         metavar="FILE",
-        help="begin with the weights of another run's checkpoint or of an exported model, a file or "
-        "the name of a bundled one such as cbagan-worlds",
+        help="begin with the weights of another run's checkpoint, or of an exported model: a file, "
+        "or the name of a bundled one such as cbagan-worlds",
     )
     recipe = parser.add_argument_group("recipe, the later overrides the earlier")
     recipe.add_argument(

@@ -264,12 +264,12 @@ RULES = {
 _BUNDLED = NetworkConfig(widths=(32, 48, 64), patch=4, cost_maps=2, white_obstacles=True)
 
 #: ``synthetic`` is what the bundled model was trained with: for images of 256 pixels, with new maps
-#: in every epoch; ``refine`` goes on from it on a data set, for segmentation alone and slowly, on
-#: maps that are met again as they are (no symmetries). ``best`` is the best one for the paper's data. ``paper`` has the values of the
-#: tables of the CBAGAN-RRT paper. Where these and its text differ (50 epochs, momentum 0.9), the
-#: tables are followed; ``alpha_1 = alpha_2 = 0.5`` is the text's, the table's 1 being for another
-#: loss, as are its factors of an IoU loss and of a plain generator loss. The numbers that it leaves
-#: out (decay, plateau) are PyTorch's defaults or this project's.
+#: in every epoch. ``refine`` goes on from it on a data set, for segmentation alone, on maps that
+#: are met again as they are (no symmetries). ``best`` is the best one for the paper's data.
+#: ``paper`` has the values of the tables of the CBAGAN-RRT paper. Where these and its text differ
+#: (50 epochs, momentum 0.9), the tables are followed; ``alpha_1 = alpha_2 = 0.5`` is the text's,
+#: the table's 1 being for another loss, as are its factors of an IoU loss and of a plain generator
+#: loss. The numbers that it leaves out (decay, plateau) are PyTorch's defaults or this project's.
 PRESETS: dict[str, TrainingConfig] = {
     "best": TrainingConfig(),
     "synthetic": TrainingConfig(

@@ -8,7 +8,6 @@ model has the weight of that name. The result computes the same as the model, wh
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator
 from dataclasses import fields
 from itertools import pairwise
@@ -23,7 +22,7 @@ from torch.nn.utils.fusion import fuse_conv_bn_weights
 
 from ..datasets.dataset import Tasks
 from ..errors import ModelError
-from ..inference.model_files import find_model, is_model
+from ..inference.model_files import find_model, is_model, load_script
 from ..inference.predictor import load_model
 from ..networks.config import NetworkConfig
 from ..networks.export_model import PatchModel, RegionModel
@@ -139,7 +138,7 @@ def _take_over(generator: Generator | PatchGenerator, weights: list[Tensor]) -> 
         if buffer.is_floating_point():
             buffer.uniform_(0.5, 1.5)
     region = RegionModel(generator).eval()
-    script = torch.jit.load(io.BytesIO(script_bytes(region, {})))  # type: ignore[no-untyped-call]
+    script = load_script(script_bytes(region, {}))
     own = _weights_of(script, generator)
     if [value.numel() for value in own] != [value.numel() for value in weights]:
         raise ValueError("it has other weights than the networks of this version")
