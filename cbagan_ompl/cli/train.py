@@ -73,7 +73,15 @@ def add_train_parser(subparsers: Any) -> None:
         help="begin with the weights of another run's checkpoint, or of an exported model: a file, "
         "or the name of a bundled one such as cbagan-worlds",
     )
-    recipe = parser.add_argument_group("recipe, the later overrides the earlier")
+    _add_recipe_options(parser.add_argument_group("recipe, the later overrides the earlier"))
+    _add_machine_options(parser.add_argument_group("machine"))
+    parser.add_argument(
+        "--tensorboard", action="store_true", help="write logs for TensorBoard into the folder"
+    )
+    parser.add_argument("--json", metavar="FILE", help="write the scores as JSON")
+
+
+def _add_recipe_options(recipe: Any) -> None:
     recipe.add_argument(
         "--preset",
         choices=sorted(PRESETS),
@@ -108,11 +116,6 @@ def add_train_parser(subparsers: Any) -> None:
         help="train the generator alone, without discriminators; the same as --set "
         "adversarial_weight=0",
     )
-    _add_machine_options(parser.add_argument_group("machine"))
-    parser.add_argument(
-        "--tensorboard", action="store_true", help="write logs for TensorBoard into the folder"
-    )
-    parser.add_argument("--json", metavar="FILE", help="write the scores as JSON")
 
 
 def _add_machine_options(group: Any) -> None:
