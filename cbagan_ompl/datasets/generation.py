@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -165,22 +166,58 @@ def generate(
     """
     if settings.needs_distances:
         require("numba", "train")
-    _prepare_folder(folder, settings, resume)
+    prepare_folder(folder, settings, resume, {})
+    write_missing(folder, settings, jobs, progress, [None] * settings.maps)
+
+
+def write_missing(
+    folder: Path,
+    settings: GenerationSettings,
+    jobs: int,
+    progress: bool,
+    maps: Sequence[NDArray[np.bool_] | None],
+) -> None:
+    """Write the maps of a set that are not there yet, their tasks, and the lists.
+
+    Args:
+        folder: see :func:`generate`, and so are ``settings``, ``jobs`` and ``progress``.
+        settings: of the set.
+        jobs: number of processes.
+        progress: show a progress bar.
+        maps: (S, S) each, true where free; None for a map that is generated.
+
+    Raises:
+        DatasetError: a file cannot be written, or a map has no task of the wanted distance.
+    """
     missing = [k for k in range(settings.maps) if not _task_list(folder, k).is_file()]
-    run_all(_write_map_and_tasks, [(folder, settings, k) for k in missing], jobs, "maps", progress)
+    calls = [(folder, settings, k, maps[k]) for k in missing]
+    run_all(_write_map_and_tasks, calls, jobs, "maps", progress)
     rows = [task_row(k, n) for k in range(settings.maps) for n in range(settings.tasks)]
     write_lists(folder, rows, settings.select_test_tasks())
 
 
-def _prepare_folder(folder: Path, settings: GenerationSettings, resume: bool) -> None:
-    """Make the folder and its record, or check the record that is there.
+def prepare_folder(
+    folder: Path, settings: GenerationSettings, resume: bool, inputs: dict[str, Any]
+) -> None:
+    """Make the folder of a set and its record, or check the record that is there.
 
     The record also names the version of OMPL: RRT's labels differ between versions.
+
+    Args:
+        folder: of the set.
+        settings: of the set.
+        resume: a set may be there.
+        inputs: what else decides the set, for the record.
+
+    Raises:
+        ConfigError: see :func:`generate`.
+        DatasetError: the record cannot be read or written.
     """
     from ..planning.compat import ompl_version
 
     record = folder / RECORD
-    made_by = json.loads(json.dumps({"settings": asdict(settings), "ompl": ompl_version()}))
+    described = {"settings": asdict(settings), "ompl": ompl_version(), **inputs}
+    made_by = json.loads(json.dumps(described))
     if os.path.lexists(record):
         if not resume:
             raise ConfigError(
@@ -188,7 +225,8 @@ def _prepare_folder(folder: Path, settings: GenerationSettings, resume: bool) ->
             )
         if _read_record(record) != made_by:
             raise ConfigError(
-                f"{record} was written with other options or another OMPL; go on with the same"
+                f"{record} was written with other options or maps, or another OMPL; go on with the "
+                "same"
             )
         return
     check_new_folder(folder)
@@ -208,9 +246,11 @@ def _task_list(folder: Path, number: int) -> Path:
     return folder / "tasks" / f"map_{number}.csv"
 
 
-def _write_map_and_tasks(folder: Path, settings: GenerationSettings, number: int) -> None:
-    """Generate a map, its tasks and their labels, and write them."""
-    free = generate_map(settings, number)
+def _write_map_and_tasks(
+    folder: Path, settings: GenerationSettings, number: int, free: NDArray[np.bool_] | None
+) -> None:
+    """Generate a map unless there is one, its tasks and their labels, and write them."""
+    free = generate_map(settings, number) if free is None else free
     grid = GridMap(free)
     rng = np.random.default_rng((settings.seed, number, 1))
     labelled = [_generate_task(grid, settings, rng) for _ in range(settings.tasks)]
