@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ..errors import PlannerError
+from ..errors import PlannerError, show
 from .compat import BINDINGS, HAS_STATE_SAMPLER_ALLOCATOR, ompl_version, planner_names
 
 #: The planner asks a StateSampler of its space.
@@ -89,13 +89,13 @@ def hook_of(planner: str) -> str:
     traits = PLANNERS.get(planner)
     if traits is None:
         raise PlannerError(
-            f"no hook reaches {planner}: its samplers are made inside OMPL. {_list_reached()}"
+            f"no hook reaches {planner}: its samplers are made inside OMPL; {_list_reached()}"
         )
     if traits.hook == STATE_SAMPLER and not HAS_STATE_SAMPLER_ALLOCATOR:
         raise PlannerError(
             f"{planner} samples from a StateSampler, which OMPL {ompl_version()} does not let "
             "Python set: it needs a build that binds StateSpace.setStateSamplerAllocator, such "
-            f"as ompl 1.7.0. {_list_reached()}"
+            f"as ompl 1.7.0; {_list_reached()}"
         )
     return traits.hook
 
@@ -113,6 +113,38 @@ def reached_planners() -> dict[str, str]:
         for name, hook in hooks.items()
         if hook != STATE_SAMPLER or HAS_STATE_SAMPLER_ALLOCATOR
     }
+
+
+def check_planner(planner: str, *, follows_heatmap: bool) -> None:
+    """Raise if a planner cannot be used.
+
+    Args:
+        planner: OMPL's name of it.
+        follows_heatmap: whether it is to sample a heat map, and so must be reached by a hook.
+
+    Raises:
+        PlannerError: this build has no such planner, or no hook reaches it; the message lists those
+            that can be used.
+    """
+    names = planner_names()
+    if not (isinstance(planner, str) and planner in names):
+        have = _list_reached() if follows_heatmap else f"there are {', '.join(sorted(names))}"
+        raise PlannerError(
+            f"there is no planner {show(planner)} to use on OMPL {ompl_version()}; {have}"
+        )
+    if follows_heatmap:
+        hook_of(planner)
+
+
+def describe_planners() -> list[str]:
+    """Return what can be planned with on the installed OMPL, as sentences for a help text."""
+    reached = reached_planners()
+    others = sorted(planner_names() - reached.keys())
+    return [
+        f"Planners that sample heat maps on OMPL {ompl_version()}: {', '.join(reached)}.",
+        f"With the uniform sampler also: {', '.join(others)}.",
+        'Other spellings, such as "RRT*" and rrt-connect, are understood.',
+    ]
 
 
 def stops_at_first(planner: str) -> bool:
@@ -150,4 +182,4 @@ def class_name(planner: Any) -> str:
 
 
 def _list_reached() -> str:
-    return f"Reached here: {', '.join(reached_planners())}"
+    return f"heat maps reach {', '.join(reached_planners())}"
