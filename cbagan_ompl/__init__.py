@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from .errors import (
     CbaganOmplError,
+    ClusterError,
     ConfigError,
     DatasetError,
     HeatmapError,
@@ -53,6 +54,7 @@ __all__ = [
     "Adaptation",
     "Attachment",
     "CbaganOmplError",
+    "ClusterError",
     "ConfigError",
     "DatasetError",
     "GridMap",

@@ -14,6 +14,7 @@ from ..datasets.splits import SPLITS
 from ..datasets.synthetic import HARD_DETOUR
 from ..errors import ConfigError
 from ..map_generators import MAP_GENERATORS
+from .options import add_scheduler_option, open_executor
 
 # Processes that the pools of Python start, at most.
 _MAX_JOBS = 1024
@@ -166,6 +167,7 @@ def _add_label_options(parser: argparse.ArgumentParser) -> None:
         help=f"longest edge of RRT in pixels (default: the size / {1 / RANGE:g})",
     )
     _add_number(parser, "--jobs", 1, "number of processes")
+    add_scheduler_option(parser)
 
 
 def _add_number(
@@ -224,7 +226,8 @@ def _generate(args: argparse.Namespace) -> int:
         seed=args.seed,
     )
     whole_number("jobs", args.jobs, 1, _MAX_JOBS)
-    generate(Path(args.output), settings, args.jobs, args.resume)
+    with open_executor(args) as executor:
+        generate(Path(args.output), settings, args.jobs, args.resume, executor=executor)
     print(f"{settings.maps * settings.tasks} tasks written to {args.output}")
     if args.json is not None:
         write_report(args.json, describe(import_dataset(Path(args.output))))
@@ -239,7 +242,10 @@ def _noise(args: argparse.Namespace) -> int:
     if args.tasks is not None:
         tasks = choose_tasks(tasks, args.tasks, args.seed)
     longest_edge = tasks.size * RANGE if args.range is None else args.range
-    values = label_noise(tasks, args.runs, longest_edge, args.seed, args.jobs)
+    with open_executor(args) as executor:
+        values = label_noise(
+            tasks, args.runs, longest_edge, args.seed, args.jobs, executor=executor
+        )
     print(f"agreement of labels on {len(tasks)} tasks, {args.runs} runs of RRT each")
     for name, scores in values.items():
         if isinstance(scores, dict):

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
+from ..common.parallel import Executor, LocalExecutor
 from ..planning.heatmap_sources import SAMPLERS
 from ..sampling.options import (
     ADAPTATION_RULES,
@@ -36,6 +39,34 @@ def map_options(args: argparse.Namespace) -> dict[str, Any]:
     if args.threshold is not None:
         options["threshold"] = args.threshold
     return options
+
+
+def add_scheduler_option(parser: Any) -> None:
+    """Add the option of :func:`open_executor` to a parser or a group of one."""
+    parser.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="run on the workers of a Dask cluster that you trust, one call in each of their "
+        "threads, and leave --jobs aside: address of the scheduler, tcp://HOST:PORT, or its "
+        "--scheduler-file; needs cbagan-ompl[cluster]",
+    )
+
+
+@contextmanager
+def open_executor(args: argparse.Namespace) -> Iterator[Executor]:
+    """Yield where the work is to be done: ``args.jobs`` processes here, or ``args.scheduler``.
+
+    Raises:
+        MissingDependencyError: Dask is wanted, and not installed.
+        ClusterError: the cluster cannot be used.
+    """
+    if args.scheduler is None:
+        yield LocalExecutor(args.jobs)
+        return
+    from ..common.cluster import ClusterExecutor
+
+    with ClusterExecutor(args.scheduler) as executor:
+        yield executor
 
 
 def add_sampler_options(parser: Any) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.files import make_folder, read_text, write_json
-from ..common.parallel import run_all
+from ..common.parallel import Executor, LocalExecutor, run_each
 from ..common.validation import (
     check_fraction,
     finite_number,
@@ -146,7 +146,12 @@ class GenerationSettings:
 
 
 def generate(
-    folder: Path, settings: GenerationSettings, jobs: int, resume: bool, progress: bool = True
+    folder: Path,
+    settings: GenerationSettings,
+    jobs: int,
+    resume: bool,
+    progress: bool = True,
+    executor: Executor | None = None,
 ) -> None:
     """Generate a training set.
 
@@ -156,18 +161,29 @@ def generate(
         jobs: number of processes.
         resume: continue in a folder where a run was interrupted: only missing maps are made.
         progress: show a progress bar.
+        executor: where maps are made; by default ``jobs`` processes of this machine. The files are
+            the same, and this process writes them.
 
     Raises:
         ConfigError: ``resume`` with other settings, or without it although the folder holds a
             set; or files that are no part of such a set are in its place.
         MissingDependencyError: geodesic distances are needed, and numba is not installed.
-        DatasetError: a file cannot be written, or a map has no task of the wanted distance.
+        DatasetError: a file cannot be written, a map has no task of the wanted distance, or a
+            process has died.
+        ClusterError: the cluster cannot do the work.
     """
     if settings.needs_distances:
         require("numba", "train")
     _prepare_folder(folder, settings, resume)
     missing = [k for k in range(settings.maps) if not _task_list(folder, k).is_file()]
-    run_all(_write_map_and_tasks, [(folder, settings, k) for k in missing], jobs, "maps", progress)
+    calls = {f"map_{k}": (settings, k) for k in missing}
+
+    def write(_: str, made: tuple[int, Tasks]) -> None:
+        number, tasks = made
+        write_map(folder, number, tasks.maps[0] > 0)
+        write_tasks(folder, number, tasks)
+
+    run_each(_make_map_and_tasks, calls, executor or LocalExecutor(jobs), write, "maps", progress)
     rows = [task_row(k, n) for k in range(settings.maps) for n in range(settings.tasks)]
     write_lists(folder, rows, settings.select_test_tasks())
 
@@ -208,21 +224,19 @@ def _task_list(folder: Path, number: int) -> Path:
     return folder / "tasks" / f"map_{number}.csv"
 
 
-def _write_map_and_tasks(folder: Path, settings: GenerationSettings, number: int) -> None:
-    """Generate a map, its tasks and their labels, and write them."""
+def _make_map_and_tasks(settings: GenerationSettings, number: int) -> tuple[int, Tasks]:
+    """Return the number of a map, and the map with its tasks and their labels."""
     free = generate_map(settings, number)
     grid = GridMap(free)
     rng = np.random.default_rng((settings.seed, number, 1))
     labelled = [_generate_task(grid, settings, rng) for _ in range(settings.tasks)]
-    write_map(folder, number, free)
-    tasks = Tasks(
+    return number, Tasks(
         free[None].astype(np.uint8),
         np.zeros(settings.tasks, dtype=np.int64),
         np.array([endpoints[0] for endpoints, _ in labelled], dtype=np.float32),
         np.array([endpoints[1] for endpoints, _ in labelled], dtype=np.float32),
         np.array([region for _, region in labelled], dtype=np.uint8),
     )
-    write_tasks(folder, number, tasks)
 
 
 def generate_map(settings: GenerationSettings, number: int) -> NDArray[np.bool_]:

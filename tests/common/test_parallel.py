@@ -9,7 +9,7 @@ from multiprocessing.context import ForkServerProcess
 import pytest
 
 from cbagan_ompl import DatasetError
-from cbagan_ompl.common.parallel import fork_server, run_all
+from cbagan_ompl.common.parallel import LocalExecutor, fork_server, run_all
 from cbagan_ompl.common.signals import interrupts_held
 
 
@@ -23,7 +23,7 @@ def test_processes_do_not_hear_interrupts() -> None:
 
 def test_a_process_that_dies() -> None:
     with pytest.raises(DatasetError, match="a process that worked on the maps has died"):
-        run_all(os._exit, [(3,)], 1, "maps", progress=False)
+        run_all(os._exit, {"map_0": (3,)}, LocalExecutor(1), "maps", progress=False)
 
 
 @pytest.mark.usefixtures("interruptible")
@@ -36,7 +36,8 @@ def test_an_interrupt_while_processes_start_leaves_none(monkeypatch: pytest.Monk
         started.append(process)
 
     monkeypatch.setattr(ForkServerProcess, "start", interrupt_and_start)
+    calls = {"map_0": (3600,), "map_1": (3600,)}
     with pytest.raises(KeyboardInterrupt):
-        run_all(time.sleep, [(3600,), (3600,)], 2, "maps", progress=False)
+        run_all(time.sleep, calls, LocalExecutor(2), "maps", progress=False)
     assert started
     assert not active_children()
