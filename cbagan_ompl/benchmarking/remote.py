@@ -14,14 +14,12 @@ from tqdm import tqdm
 from ..common.files import read_bytes, write_atomically
 from ..common.parallel import Executor, ProcessDeath, ProcessDied
 from ..common.text import one_line
-from ..errors import ConfigError, HeatmapError, ModelError
+from ..errors import ConfigError, HeatmapError
+from ..inference.copies import Files, read_copy, write_files
 from .inputs import model_files
 from .runner import run_jobs
 from .tasks import heatmap_path
 from .worker import Job
-
-#: Content of files by their names.
-Files = Mapping[str, bytes]
 
 
 def run_jobs_remotely(
@@ -49,7 +47,7 @@ def run_jobs_remotely(
     if not jobs:
         return {}
     calls = _Calls(jobs)
-    models = {sampler: _read_model(path) for sampler, path in model_files(jobs[0].settings).items()}
+    models = {sampler: read_copy(path) for sampler, path in model_files(jobs[0].settings).items()}
     failures: dict[str, str] = {}
     bar = tqdm(
         total=sum(job.settings.runs for job in jobs),
@@ -87,17 +85,6 @@ class _Calls(Mapping[str, tuple[Job, Mapping[str, Files]]]):
         return len(self.jobs)
 
 
-def _read_model(path: Path) -> Files:
-    """Return a model with the manifest beside it, which says whether it must be tried first."""
-    from ..inference.model_files import MANIFEST
-
-    files = {path.name: read_bytes(path, ModelError)}
-    manifest = path.with_name(MANIFEST)
-    if manifest.is_file():
-        files[MANIFEST] = read_bytes(manifest, ModelError)
-    return files
-
-
 def _read_heatmaps(job: Job) -> Mapping[str, Files]:
     """Return the heat maps of a task by sampler."""
     paths = {
@@ -114,11 +101,11 @@ def _run_job(models: Mapping[str, Files], job: Job, heatmaps: Mapping[str, Files
         settings = replace(
             job.settings,
             models={
-                sampler: str(_write(folder / "models" / str(i), files)[0])
+                sampler: str(write_files(folder / "models" / str(i), files))
                 for i, (sampler, files) in enumerate(models.items())
             },
             heatmap_dirs={
-                sampler: str(_write(folder / "heatmaps" / str(i), files)[0].parent)
+                sampler: str(write_files(folder / "heatmaps" / str(i), files).parent)
                 for i, (sampler, files) in enumerate(heatmaps.items())
             },
         )
@@ -127,11 +114,3 @@ def _run_job(models: Mapping[str, Files], job: Job, heatmaps: Mapping[str, Files
         if failures:
             raise ProcessDied(failures[job.task.name])
         return log.read_text(encoding="utf-8")
-
-
-def _write(folder: Path, files: Files) -> list[Path]:
-    folder.mkdir(parents=True)
-    paths = [folder / name for name in files]
-    for path in paths:
-        path.write_bytes(files[path.name])
-    return paths

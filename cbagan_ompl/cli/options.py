@@ -42,31 +42,42 @@ def map_options(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def add_scheduler_option(parser: Any) -> None:
-    """Add the option of :func:`open_executor` to a parser or a group of one."""
+    """Add the option of :func:`open_cluster` to a parser or a group of one."""
     parser.add_argument(
         "--scheduler",
         metavar="ADDRESS",
-        help="run on the workers of a Dask cluster that you trust, one call in each of their "
-        "threads, and leave --jobs aside: address of the scheduler, tcp://HOST:PORT, or its "
-        "--scheduler-file; needs cbagan-ompl[cluster]",
+        help="use the workers of a Dask cluster that you trust, and no processes of this machine: "
+        "address of its scheduler, tcp://HOST:PORT, or its --scheduler-file; needs "
+        "cbagan-ompl[cluster]",
     )
 
 
 @contextmanager
-def open_executor(args: argparse.Namespace) -> Iterator[Executor]:
-    """Yield where the work is to be done: ``args.jobs`` processes here, or ``args.scheduler``.
+def open_cluster(args: argparse.Namespace) -> Iterator[Executor | None]:
+    """Yield the cluster that ``args.scheduler`` names, None without one.
 
     Raises:
         MissingDependencyError: Dask is wanted, and not installed.
         ClusterError: the cluster cannot be used.
     """
     if args.scheduler is None:
-        yield LocalExecutor(args.jobs)
+        yield None
         return
     from ..common.cluster import ClusterExecutor
 
     with ClusterExecutor(args.scheduler) as executor:
         yield executor
+
+
+@contextmanager
+def open_executor(args: argparse.Namespace) -> Iterator[Executor]:
+    """Yield where the work is done: a cluster, or ``args.jobs`` processes of this machine.
+
+    Raises:
+        CbaganOmplError: as for :func:`open_cluster`.
+    """
+    with open_cluster(args) as cluster:
+        yield cluster or LocalExecutor(args.jobs)
 
 
 def add_sampler_options(parser: Any) -> None:

@@ -226,6 +226,7 @@ def run_each(
     finished: Callable[[str, T], object],
     unit: str,
     progress: bool = True,
+    shared: tuple[Any, ...] = (),
 ) -> None:
     """Run calls, and hand over each result as soon as it is there.
 
@@ -236,6 +237,7 @@ def run_each(
         finished: gets the name of a call and its result, in this process.
         unit: what the progress bar counts.
         progress: show the progress bar.
+        shared: first arguments of all calls, sent to each machine once.
 
     Raises:
         KeyboardInterrupt: after an interrupt; calls that have begun are given up.
@@ -246,7 +248,7 @@ def run_each(
     """
     deaths = {}
     try:
-        with closing(executor.completed(work, calls)) as done:
+        with closing(executor.completed(work, calls, shared)) as done:
             for name, result in tqdm(done, total=len(calls), unit=f" {unit}", disable=not progress):
                 if isinstance(result, ProcessDeath):
                     deaths[name] = result.reason
@@ -270,8 +272,9 @@ def run_all(
     executor: Executor,
     unit: str,
     progress: bool = True,
+    shared: tuple[Any, ...] = (),
 ) -> list[T]:
     """Return the results of calls in their order; arguments and errors as for :func:`run_each`."""
     results: dict[str, T] = {}
-    run_each(work, calls, executor, results.__setitem__, unit, progress)
+    run_each(work, calls, executor, results.__setitem__, unit, progress, shared)
     return [results[name] for name in calls]
