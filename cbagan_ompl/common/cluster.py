@@ -38,10 +38,6 @@ TIMEOUT_S = 20.0
 # Seconds between two looks for workers that are gone, and for a cluster to answer at the end.
 _POLL_S, _PATIENCE_S = 1.0, 5.0
 
-# Calls that the scheduler knows of, beyond one for each thread of a worker: their arguments and
-# results lie in memory.
-_AHEAD = 8
-
 # A file that "dask scheduler --scheduler-file" wrote has at most so many bytes.
 _MAX_FILE = 2**20
 
@@ -70,7 +66,8 @@ class ClusterExecutor:
         require("distributed", "cluster")
         self._timeout = positive_number("timeout", timeout)
         self._address = _read_address(address)
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is raised
+        for logger in ("distributed", "distributed.client"):
+            logging.getLogger(logger).setLevel(logging.CRITICAL)  # what matters is raised
         self._client = self._connect()
         try:
             self._check_workers()
@@ -100,7 +97,10 @@ class ClusterExecutor:
         first = self._submit(_hand_on, _dump(shared))
         try:
             while True:
-                for name, arguments in islice(waiting, self._free_places(len(running))):
+                # No more than can run: the scheduler holds all calls that a worker has against
+                # them when it dies.
+                places = max(self._threads(), 1) - len(running)
+                for name, arguments in islice(waiting, max(places, 0)):
                     call = _dump((work, arguments))
                     future = self._submit(_run_call, self._client.id, versions(), call, first)
                     running[future] = name
@@ -141,14 +141,22 @@ class ClusterExecutor:
             _check_versions(where, found)
 
     def _submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", "Sending large graph")  # maps and models are large
-            return self._client.submit(function, *arguments, pure=False, retries=1)
+        try:
+            with warnings.catch_warnings():
+                warnings.filterwarnings("ignore", "Sending large graph")  # models are large
+                return self._client.submit(function, *arguments, pure=False, retries=1)
+        except Exception as error:
+            raise self._gone() from error
 
-    def _free_places(self, used: int) -> int:
-        workers = self._client.scheduler_info(n_workers=-1)["workers"].values()
-        threads: int = sum(worker["nthreads"] for worker in workers)
-        return max(threads + _AHEAD - used, 0)
+    def _gone(self) -> ClusterError:
+        return ClusterError(f"the scheduler at {self._address} is gone; what was finished is kept")
+
+    def _threads(self) -> int:
+        """Return how many calls can run now, 0 also where the scheduler does not answer."""
+        try:
+            return sum(self._client.nthreads().values())
+        except Exception:  # its calls will say so
+            return 0
 
     def _wait(self, done: SimpleQueue[Future[Outcome]]) -> Future[Outcome]:
         """Return a future that is done; raise if there has been no worker for a while."""
@@ -157,7 +165,7 @@ class ClusterExecutor:
             try:
                 return done.get(timeout=_POLL_S)
             except Empty:
-                if self._client.scheduler_info(n_workers=-1)["workers"]:
+                if self._threads():
                     last = monotonic()
                 elif monotonic() > last + self._timeout:
                     raise ClusterError(
@@ -169,9 +177,7 @@ class ClusterExecutor:
         from distributed import KilledWorker
 
         if future.status in ("cancelled", "lost"):
-            raise ClusterError(
-                f"the scheduler at {self._address} is gone; what was finished is kept"
-            )
+            raise self._gone()
         try:
             outcome = future.result()
         except ProcessDied as death:
