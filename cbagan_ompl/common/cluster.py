@@ -99,7 +99,7 @@ class ClusterExecutor:
             while True:
                 # No more than can run: the scheduler holds all calls that a worker has against
                 # them when it dies.
-                places = max(self._threads(), 1) - len(running)
+                places = (self._threads() or 1) - len(running)
                 for name, arguments in islice(waiting, max(places, 0)):
                     call = _dump((work, arguments))
                     future = self._submit(_run_call, self._client.id, versions(), call, first)
@@ -151,12 +151,12 @@ class ClusterExecutor:
     def _gone(self) -> ClusterError:
         return ClusterError(f"the scheduler at {self._address} is gone; what was finished is kept")
 
-    def _threads(self) -> int:
-        """Return how many calls can run now, 0 also where the scheduler does not answer."""
+    def _threads(self) -> int | None:
+        """Return how many calls can run now, None where the scheduler does not answer."""
         try:
             return sum(self._client.nthreads().values())
-        except Exception:  # its calls will say so
-            return 0
+        except Exception:  # the futures are cancelled then
+            return None
 
     def _wait(self, done: SimpleQueue[Future[Outcome]]) -> Future[Outcome]:
         """Return a future that is done; raise if there has been no worker for a while."""
@@ -165,7 +165,7 @@ class ClusterExecutor:
             try:
                 return done.get(timeout=_POLL_S)
             except Empty:
-                if self._threads():
+                if self._threads() != 0:
                     last = monotonic()
                 elif monotonic() > last + self._timeout:
                     raise ClusterError(

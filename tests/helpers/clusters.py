@@ -90,8 +90,7 @@ def cluster_of(folder: Path, workers: int) -> Iterator[Cluster]:
         cluster.wait_for_workers(workers)
         yield cluster
         for process in cluster.processes:
-            process.terminate()
-        for process in cluster.processes:
+            process.kill()  # what they started must end all the same
             process.wait(_PATIENCE_S)
         end = time.monotonic() + _PATIENCE_S
         while (left := cluster.left()) and time.monotonic() < end:
