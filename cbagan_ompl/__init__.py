@@ -42,11 +42,12 @@ if TYPE_CHECKING:
     )
     from .planning.plan import plan
     from .planning.plan_result import PlanResult
+    from .planning.robot_validity import RobotMotionValidator, RobotValidityChecker
     from .planning.validity import GridMotionValidator, GridValidityChecker
     from .plotting import save_figure
     from .robots.robot import Robot
     from .sampling.heatmap import Heatmap
-    from .sampling.options import Adaptation, SamplerOptions
+    from .sampling.options import Adaptation, HeadingSpread, SamplerOptions
 
 __version__ = "0.2.0"
 
@@ -60,6 +61,7 @@ __all__ = [
     "GridMap",
     "GridMotionValidator",
     "GridValidityChecker",
+    "HeadingSpread",
     "Heatmap",
     "HeatmapError",
     "HeatmapStateSampler",
@@ -72,6 +74,8 @@ __all__ = [
     "Predictor",
     "Robot",
     "RobotError",
+    "RobotMotionValidator",
+    "RobotValidityChecker",
     "SamplerOptions",
     "Task",
     "TaskError",
@@ -102,11 +106,12 @@ _HOMES = {
         "state_sampler_allocator",
         "valid_state_sampler_allocator",
     ),
+    "planning.robot_validity": ("RobotMotionValidator", "RobotValidityChecker"),
     "planning.validity": ("GridMotionValidator", "GridValidityChecker"),
     "plotting": ("save_figure",),
     "robots.robot": ("Robot",),
     "sampling.heatmap": ("Heatmap",),
-    "sampling.options": ("Adaptation", "SamplerOptions"),
+    "sampling.options": ("Adaptation", "HeadingSpread", "SamplerOptions"),
 }
 protect_exit()
 

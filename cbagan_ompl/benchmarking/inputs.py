@@ -101,16 +101,16 @@ def _differences(there: Any, now: Any, place: str = "") -> Iterator[str]:
 
 def model_files(settings: Settings) -> dict[str, Path]:
     """Return the file of the model of each sampler that has one, the bundled model included."""
-    models = {sampler: Path(path) for sampler, path in settings.models.items()}
-    if LEARNED in set(settings.samplers) - set(models) - set(settings.heatmap_dirs):
-        from ..inference.model_files import bundled_model
+    from ..inference.model_files import find_model
 
-        models[LEARNED] = bundled_model()
-    return models
+    models: dict[str, str | None] = dict(settings.models)
+    if LEARNED in set(settings.samplers) - set(models) - set(settings.heatmap_dirs):
+        models[LEARNED] = None
+    return {sampler: find_model(model) for sampler, model in models.items()}
 
 
 def _describe_map(task: BenchmarkTask) -> dict[str, Any]:
-    grid = task.grid
+    grid = task.workspace.source
     return {
         "width": grid.width,
         "height": grid.height,
@@ -121,10 +121,9 @@ def _describe_map(task: BenchmarkTask) -> dict[str, Any]:
 
 
 def _describe_task(task: BenchmarkTask, settings: Settings) -> dict[str, Any]:
-    (start_x, start_y), (goal_x, goal_y) = task.task.start, task.task.goal
     described: dict[str, Any] = {
-        "start": [float(start_x), float(start_y)],
-        "goal": [float(goal_x), float(goal_y)],
+        "start": [float(value) for value in task.task.start],
+        "goal": [float(value) for value in task.task.goal],
         "optimal_cost": task.task.optimal_cost,
         "family": task.task.family,
     }

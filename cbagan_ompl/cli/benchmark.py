@@ -26,6 +26,7 @@ from .options import (
     open_executor,
     sampler_options,
 )
+from .robot_options import add_robot_options, robot_of
 
 # Tasks that run at a time, and characters that a report shows of the command.
 _MOST_JOBS, _LONGEST_COMMAND = 1024, 20_000
@@ -68,9 +69,9 @@ def add_benchmark_parser(commands: Any) -> None:
     tasks.add_argument(
         "--tasks",
         metavar="FILE",
-        help="tasks for the maps: .csv (map,start_x,start_y,goal_x,goal_y[,optimal_cost,"
-        "family], where family is the kind of map) or MovingAI .scen (default: those that come "
-        "with a map, otherwise random ones)",
+        help="tasks for the maps: .csv (map,start_x,start_y,goal_x,goal_y[,start_yaw,"
+        "goal_yaw,optimal_cost,family], where family is the kind of map) or MovingAI .scen "
+        "(default: those that come with a map, otherwise random ones)",
     )
     tasks.add_argument(
         "--tasks-per-map",
@@ -78,10 +79,8 @@ def add_benchmark_parser(commands: Any) -> None:
         metavar="N",
         help="at most N tasks of each map, spread over its list (default: all; 4 random ones)",
     )
-    tasks.add_argument(
-        "--radius", type=float, default=0.0, metavar="R", help="radius of the robot (default: 0)"
-    )
     add_map_options(tasks)
+    add_robot_options(parser.add_argument_group("robot", "what moves; a point by default"))
 
     comparison = parser.add_argument_group("comparison")
     comparison.add_argument(
@@ -113,7 +112,8 @@ def add_benchmark_parser(commands: Any) -> None:
         default=[],
         type=_model,
         metavar="[NAME=]FILE",
-        help="exported model of the learned sampler (default: the bundled one); with a name, "
+        help="exported model of the learned sampler, or the name of a bundled one such as cbagan "
+        "(default: the default model); with NAME, "
         "another sampler NAME with the heat maps of this model; may be repeated",
     )
     add_sampler_options(comparison)
@@ -217,7 +217,7 @@ def _settings(args: argparse.Namespace) -> Settings:
         sampler_options=sampler_options(args),
         models=models,
         heatmap_dirs=folders,
-        radius=args.radius,
+        robot=robot_of(args),
         within=args.within,
     )
 
@@ -235,7 +235,7 @@ def _benchmark(args: argparse.Namespace) -> int:
         )
     settings = _settings(args)
     tasks = select_tasks(
-        args.maps, args.tasks, args.tasks_per_map, args.radius, args.seed, map_options(args)
+        args.maps, args.tasks, args.tasks_per_map, settings.robot, args.seed, map_options(args)
     )
     benchmark = Benchmark(tasks, settings, Path(args.output), args.resume)
     with open_executor(args) as executor:

@@ -53,7 +53,8 @@ def add_evaluate_parser(commands: Any) -> None:
         "--model",
         action="append",
         metavar="FILE",
-        help="exported model; may be repeated (default: the bundled one)",
+        help="exported model, or the name of a bundled one; may be repeated (default: the default "
+        "model)",
     )
     parser.add_argument(
         "--predictions",
@@ -92,15 +93,17 @@ def _evaluate(args: argparse.Namespace) -> int:
     )
     from ..evaluation.report import markdown
     from ..evaluation.stored_predictions import load_predictions
-    from ..inference.model_files import bundled_model
+    from ..inference.model_files import find_model
     from ..inference.predictor import load_model
 
     check_at_least("seed", args.seed, 0)
     stored = [_parse_predictions(text) for text in args.predictions]
-    files = [Path(path) for path in args.model or [bundled_model()]]
+    files = [find_model(model) for model in args.model or [None]]
     models = [load_model(path) for path in files]
     names = [str(model.record["name"]) for model in models] + [name for name, _ in stored]
     dataset = load_dataset(args.dataset)
+    # Before the models are evaluated, which takes a while.
+    regions = [load_predictions(path, Path(args.dataset), args.split) for _, path in stored]
     tasks = dataset.test if args.split == "test" else dataset.train
     baselines = trivial_baselines(tasks)
     _check_names([*names, *baselines])
@@ -117,8 +120,8 @@ def _evaluate(args: argparse.Namespace) -> int:
             for name, model, regions in zip(names, models, predicted, strict=False)
         ),
         *(
-            evaluator.evaluate(name, load_predictions(folder, Path(args.dataset), args.split))
-            for name, folder in stored
+            evaluator.evaluate(name, predicted)
+            for (name, _), predicted in zip(stored, regions, strict=True)
         ),
         *(evaluator.evaluate(name, regions) for name, regions in baselines.items()),
     ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
 from typing import Any
 
 from ..common.outputs import write_report
@@ -12,7 +13,7 @@ from ..datasets.dataset import load_dataset
 from ..datasets.synthetic import HARD_DETOUR, TASKS_PER_MAP, SyntheticSettings
 from ..errors import ConfigError
 from ..networks.config import NETWORKS
-from ..training.config import PRESETS, TrainingConfig
+from ..training.config import LAST, PRESETS, TrainingConfig
 from ..training.task_sources import DatasetSource, SyntheticSchedule, TaskSource, synthetic_source
 
 _MAX_THREADS = 4096
@@ -52,7 +53,7 @@ def add_train_parser(subparsers: Any) -> None:
         description=_TRAIN_HELP,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.set_defaults(run=_train)
+    parser.set_defaults(run=_train, can_resume=_can_resume)
     tasks = parser.add_argument_group("tasks, one of both")
     tasks.add_argument("dataset", metavar="DATASET", nargs="?", help="folder that holds train.csv")
     tasks.add_argument(
@@ -63,14 +64,23 @@ def add_train_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--resume",
         action="store_true",
-        help="go on from last.pt in the output folder, or begin if it is not there yet",
+        help="go on from last.pt in the output folder, or begin if it is not there yet; --epochs "
+        "may be larger than before",
     )
     parser.add_argument(
         "--start-from",
         metavar="FILE",
         help="begin with the weights of another run's checkpoint, which this one refines",
     )
-    recipe = parser.add_argument_group("recipe, the later overrides the earlier")
+    _add_recipe_options(parser.add_argument_group("recipe, the later overrides the earlier"))
+    _add_machine_options(parser.add_argument_group("machine"))
+    parser.add_argument(
+        "--tensorboard", action="store_true", help="write logs for TensorBoard into the folder"
+    )
+    parser.add_argument("--json", metavar="FILE", help="write the scores as JSON")
+
+
+def _add_recipe_options(recipe: Any) -> None:
     recipe.add_argument(
         "--preset",
         choices=sorted(PRESETS),
@@ -98,11 +108,12 @@ def add_train_parser(subparsers: Any) -> None:
         f"{', '.join(TrainingConfig().to_dict())}",
     )
     recipe.add_argument("--epochs", type=int, metavar="N", help="the same as --set epochs=N")
-    _add_machine_options(parser.add_argument_group("machine"))
-    parser.add_argument(
-        "--tensorboard", action="store_true", help="write logs for TensorBoard into the folder"
+    recipe.add_argument(
+        "--segmentation-only",
+        action="store_true",
+        help="train the generator alone, without discriminators; the same as --set "
+        "adversarial_weight=0",
     )
-    parser.add_argument("--json", metavar="FILE", help="write the scores as JSON")
 
 
 def _add_machine_options(group: Any) -> None:
@@ -164,6 +175,8 @@ def _recipe(args: argparse.Namespace) -> TrainingConfig:
     if args.config is not None:
         config = TrainingConfig.from_file(args.config, config)
     config = config.with_assignments(args.set)
+    if args.segmentation_only:
+        config = config.updated({"adversarial_weight": 0})
     return config if args.epochs is None else config.updated({"epochs": args.epochs})
 
 
@@ -203,6 +216,11 @@ def _train(args: argparse.Namespace) -> int:
     if args.json is not None:
         write_report(args.json, result)
     return 0
+
+
+def _can_resume(args: argparse.Namespace) -> bool:
+    """Return whether the first epoch of a run of ``train`` is done."""
+    return (Path(args.output) / LAST).exists()
 
 
 def _source(args: argparse.Namespace, config: TrainingConfig) -> AbstractContextManager[TaskSource]:

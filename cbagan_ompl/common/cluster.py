@@ -154,7 +154,8 @@ class ClusterExecutor:
     def _threads(self) -> int | None:
         """Return how many calls can run now, None where the scheduler does not answer."""
         try:
-            return sum(self._client.nthreads().values())
+            threads: int = sum(self._client.nthreads().values())
+            return threads
         except Exception:  # the futures are cancelled then
             return None
 

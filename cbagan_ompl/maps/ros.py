@@ -110,15 +110,29 @@ class _Description:
         return mode.lower()
 
     @property
-    def image(self) -> DecodedImage:
+    def image_path(self) -> Path:
+        """Of the image; the one in the file is relative to its folder."""
         file = self.keys["image"]
         if not isinstance(file, str) or not file:
             raise self.error("image", "must be the path of an image, relative to this file")
-        path = self.path.parent / Path(file).expanduser()
+        return self.path.parent / Path(file).expanduser()
+
+    @property
+    def image(self) -> DecodedImage:
+        path = self.image_path
         try:
             return decode_image(read_bytes(path, limit=MAX_IMAGE_BYTES), str(path))
         except MapError as error:
             raise self.error("image", str(error)) from error
+
+
+def image_of_ros_map(path: Path) -> Path:
+    """Return the path of the image that a map_server YAML file names.
+
+    Raises:
+        MapError: the file cannot be read, or is no such file.
+    """
+    return _Description(path).image_path
 
 
 def read_ros_map(path: Path, *, unknown_is_free: bool) -> RawMap:

@@ -11,7 +11,7 @@ from numpy.lib import format as npy_format
 from numpy.typing import NDArray
 
 from ..common.files import open_regular, read_bytes, reason
-from ..errors import CbaganOmplError, HeatmapError, show
+from ..errors import HeatmapError, show
 from ..maps.image_files import decode_image
 
 # Bytes in which a header of a NumPy file must fit: that of a 2-D array of numbers takes 128.
@@ -37,11 +37,8 @@ def read_heatmap_values(path: Path, shape: tuple[int, int]) -> NDArray[Any]:
         return _read_array(path, shape)
     height, width = shape
     data = read_bytes(path, HeatmapError, _MOST_BYTES_PER_PIXEL * height * width + _OVERHEAD)
-    try:
-        gray, white, _ = decode_image(data, str(path))
-    except CbaganOmplError as error:
-        raise HeatmapError(f"cannot read the heat map {error}") from error
-    _check_shape(path, gray.shape, shape)
+    name = f"cannot read the heat map {path}"
+    gray, white, _ = decode_image(data, name, HeatmapError, (width, height))
     if white in (255, 65535):  # the full range of a type of its own
         return gray.astype(np.uint8) if white == 255 else gray
     return gray / np.float32(white)

@@ -19,18 +19,18 @@ from ..networks.config import MAX_IMAGE_SIZE, MAX_WEIGHTS
 from ..networks.factory import check_weights, make_generator
 from ..networks.generator import Generator
 from ..networks.patch_generator import PatchGenerator
-from .config import TrainingConfig
+from .config import BEST, LAST, TrainingConfig
 
 #: Version of the form of a checkpoint; it goes up when the name of an option or a weight changes.
 SCHEMA = 4
-LAST, BEST = "last.pt", "best.pt"
 
 #: Largest checkpoint: six numbers for each weight (the weight, its average in the generator, two
 #: moments of the optimiser), and as much again for the log.
 MAX_CHECKPOINT_BYTES = 8 * 4 * MAX_WEIGHTS
 
 _SCORES = dict.fromkeys(("iou", "dice", "precision", "recall", "connectivity"), float)
-_NETWORKS = ("generator", "map_discriminator", "point_discriminator", "average")
+_GENERATORS = ("generator", "average")
+_DISCRIMINATORS = ("map_discriminator", "point_discriminator")
 _SYNTHETIC = {
     "seed": int,
     "hard_fraction": float,
@@ -49,7 +49,7 @@ _FORM: dict[str, Any] = {
         "train_tasks": int,
         "test_tasks": int,
     },
-    "gan": {name: {} for name in (*_NETWORKS, "optimizers")},
+    "gan": {name: {} for name in (*_GENERATORS, "optimizers")},
     "rng": str,
     "noise_rng": torch.Tensor,
     "history": [{"epoch": int, "losses": {}, "validation": _SCORES}],
@@ -128,7 +128,10 @@ def best_generator(
 
 
 def _check_form(state: dict[str, Any], path: Path) -> None:
-    form = dict(_FORM)
+    form, networks = dict(_FORM), [*_GENERATORS]
+    if isinstance(state.get("config"), dict) and state["config"].get("adversarial_weight", 1):
+        networks += _DISCRIMINATORS
+        form["gan"] = form["gan"] | {name: {} for name in _DISCRIMINATORS}
     if state.get("test") is not None:
         form |= {"test": _SCORES, "trivial": {}}
     wrong = _find_mismatch(state, form)
@@ -138,7 +141,7 @@ def _check_form(state: dict[str, Any], path: Path) -> None:
         wrong = _find_mismatch(state["trivial"], dict.fromkeys(state["trivial"], _SCORES))
     if wrong is not None:
         raise ModelError(f"{path}: damaged, its entry {wrong} is missing or of another kind")
-    for name in _NETWORKS:
+    for name in networks:
         for key, weights in state["gan"][name].items():
             if not isinstance(weights, torch.Tensor) or not torch.isfinite(weights).all():
                 raise ModelError(f"{path}: damaged, the weights {show(key)} are not finite numbers")

@@ -29,6 +29,9 @@ from ..networks.config import (
 SCHEDULES = ("one-cycle", "exponential")
 PRECISIONS = ("float32", "bfloat16")
 
+#: The checkpoints of a run: of its last epoch, and of its best one.
+LAST, BEST = "last.pt", "best.pt"
+
 #: Most epochs of a run.
 MAX_EPOCHS = 10_000
 
@@ -60,7 +63,8 @@ class TrainingConfig:
         plateau_factor: factor on the learning rates each time.
         adversarial_every: train the discriminators, and the generator against them, in every
             n-th step; the other steps train the generator on the supervised losses alone.
-        adversarial_weight: factor of each adversarial loss (alpha_1 = alpha_2 of the paper).
+        adversarial_weight: factor of each adversarial loss (alpha_1 = alpha_2 of the paper); with
+            0 there are no discriminators, and the generator is trained for segmentation alone.
         adaptive_alpha: alpha of the paper's adaptive generator loss, in which the discriminator
             that errs more weighs more; 0 gives both the same weight.
         pixel_weight: factor of the pixel-wise squared error.

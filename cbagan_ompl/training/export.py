@@ -199,8 +199,9 @@ def model_card(record: dict[str, Any]) -> str:
     return f"""# {record["name"]}
 
 Predicts, for a 2-D occupancy map with a start and a goal, the region that good paths probably run
-through: the generator of {_describe_network(record["recipe"])}, trained against a map and a
-point discriminator, exported as TorchScript on {record["date"]} with torch {record["torch"]}.
+through: the generator of {_describe_network(record["recipe"])},
+{_describe_training(record["recipe"])}, exported as
+TorchScript on {record["date"]} with torch {record["torch"]}.
 
 - Input: {record["inputs"]}
 - Output: {record["outputs"]}
@@ -265,6 +266,12 @@ def _describe_network(recipe: dict[str, Any]) -> str:
     if kinds == ["channel", "spatial"]:
         return "a convolutional block attention GAN (CBAGAN-RRT)"
     return f"a GAN with {' and '.join(kinds) or 'no'} attention"
+
+
+def _describe_training(recipe: dict[str, Any]) -> str:
+    if not recipe.get("adversarial_weight"):
+        return "trained for segmentation alone, without discriminators"
+    return "trained against a map and a point discriminator"
 
 
 def _update_manifest(model: Path, force: bool) -> None:

@@ -273,6 +273,24 @@ def test_no_input_is_replaced(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert path.read_bytes() == before
 
 
+def test_what_a_map_names_is_an_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    image, scenes = tmp_path / "pixels.png", tmp_path / "cells.map.scen"
+    cv2.imwrite(str(image), np.full((40, 40), 255, np.uint8))
+    (tmp_path / "hall.yaml").write_text(
+        "image: pixels.png\nresolution: 1\norigin: [0, 0, 0]\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.2\n"
+    )
+    (tmp_path / "cells.map").write_text("type octile\nheight 9\nwidth 9\nmap\n" + "." * 9 + "\n")
+    scenes.write_text("version 1\n")
+    for name, path in (("hall.yaml", image), ("cells.map", scenes)):
+        before = path.read_bytes()
+        words = ["plan", str(tmp_path / name), "--start", "5,5", "--goal", "35,35"]
+        for option in ["--json", *(["--output"] if path == image else [])]:
+            assert main([*words, option, str(path), "--force"]) == 2
+            assert "it is what the command reads" in capsys.readouterr().err
+        assert path.read_bytes() == before
+
+
 def test_reports_are_replaced_by_reports_alone(tmp_path: Path) -> None:
     path = tmp_path / "plan.json"
     path.write_text('{"mine": 1}')

@@ -35,8 +35,9 @@ def checkpoint(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def start(*words: str, prepare: Callable[[], None] | None = None) -> subprocess.Popen[str]:
+    # Without byte code, which a limit on the size of files would cut off for every later process.
     return subprocess.Popen(
-        [sys.executable, "-m", "cbagan_ompl.cli", *words],
+        [sys.executable, "-B", "-m", "cbagan_ompl.cli", *words],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,

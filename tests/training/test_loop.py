@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from helpers.synthetic import SMALL, TINY_PATCHES, threaded_source
 from helpers.tiny_model import TINY
@@ -15,6 +16,8 @@ torch = pytest.importorskip("torch")
 from cbagan_ompl import ConfigError
 from cbagan_ompl.training import loop
 from cbagan_ompl.training.checkpoints import load_checkpoint
+from cbagan_ompl.training.export import export
+from cbagan_ompl.training.gan import Gan
 from cbagan_ompl.training.loop import train
 from cbagan_ompl.training.task_sources import DatasetSource
 
@@ -55,6 +58,15 @@ def test_resumed_run_equals_uninterrupted(
     assert [entry["losses"] for entry in states[0]["history"]] == [
         entry["losses"] for entry in states[1]["history"]
     ]
+
+
+def test_lack_of_memory_is_said(
+    source: DatasetSource, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(loop, "discriminator_step", lambda *_: torch.empty(2**50))
+    said = r"not enough memory to train on batches of \d+ images of \d+ pixels: lower batch_size"
+    with pytest.raises(ConfigError, match=said):
+        train(source, TINY, tmp_path, device="cpu", progress=False)
 
 
 def test_a_resumed_run_on_synthetic_maps_equals_an_uninterrupted_one(
@@ -147,6 +159,63 @@ def test_resume_goes_on_where_a_run_ended_before_its_first_epoch(
     shutil.copy(tmp_path / "whole" / "best.pt", tmp_path / "run")
     run = train(source, config, tmp_path / "run", resume=True, device="cpu", progress=False)
     assert run["test"] == whole["test"]
+
+
+def test_a_longer_run_goes_on_where_a_shorter_one_ended(
+    source: DatasetSource, tmp_path: Path
+) -> None:
+    # A schedule that does not depend on the number of epochs.
+    long = TINY.updated({"schedule": "exponential"})
+    short = long.updated({"epochs": 1})
+    whole = train(source, long, tmp_path / "whole", device="cpu", progress=False)
+    train(source, short, tmp_path / "parts", device="cpu", progress=False)
+    parts = train(source, long, tmp_path / "parts", resume=True, device="cpu", progress=False)
+    assert parts["test"] == whole["test"]
+    states = [load_checkpoint(tmp_path / run / "last.pt") for run in ("whole", "parts")]
+    assert equal(states[0]["gan"], states[1]["gan"])
+    assert states[1]["config"]["epochs"] == 2
+    with pytest.raises(ConfigError, match="2 epochs behind it, more than the 1 asked for"):
+        train(source, short, tmp_path / "parts", resume=True, device="cpu", progress=False)
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ({"adversarial_every": 1}, [0, 1, 2]),
+        ({"adversarial_every": 2}, [0, 2]),
+        ({"adversarial_weight": 0}, []),
+    ],
+)
+def test_the_steps_with_discriminators(
+    source: DatasetSource, options: dict[str, Any], expected: list[int]
+) -> None:
+    config = TINY.updated(options)
+    gan = Gan(config, torch.device("cpu"))
+    run = loop.Run(gan, np.random.default_rng(0), torch.Generator())
+    tasks = source.epoch(0)
+    with_discriminators = []
+    for step in range(3):
+        losses = loop._step(run, config, tasks, np.arange(4), torch.device("cpu"), step)
+        assert {"pixel", "segmentation"} <= losses.keys()
+        both = {"adversarial", "map_discriminator", "point_discriminator"}
+        if losses.keys() & both:
+            assert both <= losses.keys()
+            with_discriminators.append(step)
+    assert with_discriminators == expected
+
+
+def test_segmentation_alone_trains_exports_and_resumes(
+    source: DatasetSource, tmp_path: Path
+) -> None:
+    config = TINY.updated({"adversarial_weight": 0, "epochs": 1})
+    run = train(source, config, tmp_path / "run", device="cpu", progress=False)
+    longer = config.updated({"epochs": 2})
+    train(source, longer, tmp_path / "run", resume=True, device="cpu", progress=False)
+    state = load_checkpoint(run["checkpoint"])
+    assert "map_discriminator" not in state["gan"]
+    export(run["checkpoint"], tmp_path / "alone.pt")
+    card = " ".join((tmp_path / "alone.md").read_text().split())
+    assert "trained for segmentation alone, without discriminators" in card
 
 
 @pytest.mark.parametrize("name", ["last.pt", "best.pt", "log.jsonl"])
