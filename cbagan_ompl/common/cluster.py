@@ -66,7 +66,7 @@ class ClusterExecutor:
         require("distributed", "cluster")
         self._timeout = positive_number("timeout", timeout)
         self._address = _read_address(address)
-        for logger in ("distributed", "distributed.client"):
+        for logger in ("distributed", "distributed.client", "tornado.application"):
             logging.getLogger(logger).setLevel(logging.CRITICAL)  # what matters is raised
         self._client = self._connect()
         try:
@@ -247,7 +247,10 @@ def _run_call(client: str, wanted: dict[str, str], call: bytes, shared: bytes) -
     found = versions()
     if found != wanted:  # a worker that came after the others were checked
         return Outcome(error=ClusterError(f"a worker has {found}, where {wanted} is wanted"))
-    return _children.run(client, call, shared)
+    outcome = _children.run(client, call, shared)
+    if isinstance(outcome.error, ProcessDied):
+        raise outcome.error  # which the scheduler counts as a death
+    return outcome
 
 
 def _end_calls(client: str) -> None:

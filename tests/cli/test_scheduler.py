@@ -30,6 +30,7 @@ from cbagan_ompl.benchmarking.worker import Job
 from cbagan_ompl.cli import main
 from cbagan_ompl.common.cluster import ClusterExecutor
 from cbagan_ompl.datasets.generation import generate
+from cbagan_ompl.planning.workspace import Workspace
 
 # Only against hanging: a busy machine may take long.
 _PATIENCE_S = 60
@@ -83,19 +84,25 @@ def test_benchmark_is_the_same_on_workers(cluster: Cluster, tmp_path: Path) -> N
     assert first.is_file()
 
 
-def test_a_task_that_aborts_is_reported_alone(
+def test_tasks_that_fail_are_reported_alone(
     cluster: Cluster, two_walls: GridMap, tmp_path: Path
 ) -> None:
-    settings = Settings(("RRT",), ("uniform",), runs=1, time=5, range=20)
+    good = Settings(("RRT",), ("uniform",), runs=1, time=5, range=20)
+    bad = Settings(("Magic",), ("uniform",), runs=1)
     tasks = [
-        kind(two_walls, number, Task((10, 10), (240, 240)))
+        kind(Workspace(two_walls), number, Task((10, 10), (240, 240)))
         for number, kind in enumerate((Aborting, BenchmarkTask, BenchmarkTask))
     ]
-    jobs = [Job(task, settings, tmp_path / f"{task.name}.log") for task in tasks]
+    jobs = [
+        Job(task, settings, tmp_path / f"{task.name}.log")
+        for task, settings in zip(tasks, (good, bad, good), strict=True)
+    ]
     with ClusterExecutor(str(cluster.file)) as executor:
         failures = run_jobs_remotely(jobs, executor, show_progress=False)
-    assert failures == {"two_walls_0": "ended by SIGABRT"}
-    assert {path.name for path in tmp_path.iterdir()} == {"two_walls_1.log", "two_walls_2.log"}
+    assert set(failures) == {"two_walls_0", "two_walls_1"}
+    assert failures["two_walls_0"] == "ended by SIGABRT"
+    assert "PlannerError: there is no planner 'Magic'" in failures["two_walls_1"].splitlines()[-1]
+    assert [path.name for path in tmp_path.iterdir()] == ["two_walls_2.log"]
 
 
 def test_a_set_is_the_same_although_a_worker_dies(tmp_path: Path) -> None:
