@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from .errors import (
     CbaganOmplError,
+    CbaganOmplWarning,
     ClusterError,
     ConfigError,
     DatasetError,
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     )
     from .planning.plan import plan
     from .planning.plan_result import PlanResult
+    from .planning.replanner import Replanner
     from .planning.robot_validity import RobotMotionValidator, RobotValidityChecker
     from .planning.validity import GridMotionValidator, GridValidityChecker
     from .plotting import save_figure
@@ -55,6 +57,7 @@ __all__ = [
     "Adaptation",
     "Attachment",
     "CbaganOmplError",
+    "CbaganOmplWarning",
     "ClusterError",
     "ConfigError",
     "DatasetError",
@@ -72,6 +75,7 @@ __all__ = [
     "PlanResult",
     "PlannerError",
     "Predictor",
+    "Replanner",
     "Robot",
     "RobotError",
     "RobotMotionValidator",
@@ -100,6 +104,7 @@ _HOMES = {
     "planning.hooks": ("reached_planners",),
     "planning.plan": ("plan",),
     "planning.plan_result": ("PlanResult",),
+    "planning.replanner": ("Replanner",),
     "planning.ompl_samplers": (
         "HeatmapStateSampler",
         "HeatmapValidStateSampler",

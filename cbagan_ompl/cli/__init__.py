@@ -7,14 +7,17 @@ import errno
 import os
 import sys
 import traceback
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
 
 from .. import __version__
 from ..common.files import reason
 from ..common.memory import is_out_of_memory
 from ..common.outputs import check_output
 from ..common.signals import Terminated
-from ..errors import CbaganOmplError
+from ..errors import CbaganOmplError, CbaganOmplWarning
 from .inputs import input_files
 from .parser import Parser
 
@@ -60,7 +63,8 @@ def execute(args: argparse.Namespace) -> int:
     os.environ["MPLBACKEND"] = "agg"
     try:
         check_output(getattr(args, "json", None), input_files(args), force=_forces(args))
-        return int(args.run(args))
+        with _printed_warnings(args.command):
+            return int(args.run(args))
     except BrokenPipeError:
         # The reader of our output has gone, as in "| head -1": files are written by then.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -86,6 +90,25 @@ def _resume_hint(args: argparse.Namespace) -> str:
     if hasattr(args, "can_resume") and not args.can_resume(args):
         return " before anything was kept; begin again with the same command"
     return "; go on with the same command and --resume"
+
+
+@contextmanager
+def _printed_warnings(command: str) -> Iterator[None]:
+    """Print each warning of this package once, in one line, whatever filters Python was given."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("default", CbaganOmplWarning)
+        show_others = warnings.showwarning
+
+        def show_warning(
+            message: Warning | str, category: type[Warning], *where: Any, **more: Any
+        ) -> None:
+            if issubclass(category, CbaganOmplWarning):
+                print(f"cbagan-ompl {command}: warning: {message}", file=sys.stderr)
+            else:
+                show_others(message, category, *where, **more)
+
+        warnings.showwarning = show_warning
+        yield
 
 
 def _explain(error: Exception) -> tuple[int, str]:

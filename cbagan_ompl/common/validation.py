@@ -179,7 +179,7 @@ def require(package: str, extra: str) -> None:
     except (ImportError, OSError) as error:  # OSError for a library that is not there
         raise MissingDependencyError(
             f"this needs {package}, which cannot be imported ({error}); "
-            f"install it with: pip install 'cbagan-ompl[{extra}]'"
+            f"install it in the clone of cbagan-ompl with: pip install -e '.[{extra}]'"
         ) from error
 
 

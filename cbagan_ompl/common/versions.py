@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
 import cv2
@@ -11,6 +12,7 @@ import scipy
 from .. import __version__
 
 
+@cache
 def ompl_version() -> str:
     """Return the version of the installed OMPL package; "unknown" for a build without metadata."""
     try:

@@ -10,8 +10,9 @@ from typing import Any
 
 from ..errors import PlannerError, show
 from ..sampling.adaptation import AdaptiveMixture
+from ..sampling.checks import check_heatmap
 from ..sampling.headings import HeadingSampler
-from ..sampling.heatmap import Heatmap, check_heatmap
+from ..sampling.heatmap import Heatmap
 from ..sampling.options import OPTIMIZING_SHARPNESS, SamplerOptions
 from ..sampling.sampler import HeatmapSampler
 from . import compat, ompl_samplers

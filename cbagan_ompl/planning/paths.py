@@ -76,6 +76,8 @@ def follow_path(
     """
     if not len(path):
         return path
+    if not workspace.robot.has_heading:
+        return divide_segments(path, step)
     space = setup.getStateSpace()
     states = [workspace.make_state(space, endpoint) for endpoint in path]
     passed = compat.new_state(space)
@@ -87,3 +89,26 @@ def follow_path(
             points.append(workspace.read_states([_raw(passed)])[0])
         points.append(way_point)
     return np.array(points)
+
+
+def divide_segments(path: NDArray[np.float64], step: float) -> NDArray[np.float64]:
+    """Return points along a polyline, its corners among them.
+
+    Args:
+        path: corners, (N, 2), world.
+        step: the longest distance between two points, world units.
+
+    Returns:
+        (M, 2), world; each segment is divided into equal steps.
+
+    Example:
+        >>> divide_segments(np.array([[0.0, 0.0], [0.0, 1.0]]), 0.5).tolist()
+        [[0.0, 0.0], [0.0, 0.5], [0.0, 1.0]]
+    """
+    moves = np.diff(path, axis=0)
+    counts = np.ceil(np.hypot(*moves.T) / step).astype(int).clip(1)
+    # Of each point: its segment, and which step of it.
+    segments = np.repeat(np.arange(len(counts)), counts)
+    steps = np.arange(len(segments)) - np.repeat(counts.cumsum() - counts, counts)
+    fractions = (steps / counts[segments])[:, None]
+    return np.vstack((path[segments] + fractions * moves[segments], path[-1:]))

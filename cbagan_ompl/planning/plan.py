@@ -281,6 +281,7 @@ def _result(
         nodes=run.nodes,
         nodes_at_first_solution=run.nodes_at_first_solution if is_solved else None,
         sample_counts=attachment.sample_counts if attachment else {"learned": 0, "uniform": 0},
+        heatmap_kept=False,
         heatmap=heatmap,
         tree=_tree_of(setup) if job.keep_tree else None,
     )

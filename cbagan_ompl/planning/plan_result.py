@@ -59,6 +59,8 @@ class PlanResult:
             the planner does not let it be known.
         sample_counts: ``{"learned": n, "uniform": m}`` samples that the planner had from the heat
             map's hook; both 0 for the uniform sampler, which has no hook.
+        heatmap_kept: whether the heat map is that of an earlier plan of a
+            :class:`cbagan_ompl.Replanner`.
         heatmap: what was sampled; None for the uniform sampler. Not part of the JSON.
         tree: edges of the planner's tree, (M, 2, 2): two points (x, y) each, world; when asked for.
             Not part of the JSON.
@@ -98,6 +100,7 @@ class PlanResult:
     nodes: int
     nodes_at_first_solution: int | None
     sample_counts: dict[str, int]
+    heatmap_kept: bool
     heatmap: Heatmap | None = field(repr=False, metadata={"json": False})
     tree: NDArray[np.float64] | None = field(repr=False, metadata={"json": False})
 

@@ -140,7 +140,7 @@ class Workspace:
         return np.array([(state[0], state[1]) for state in states]).reshape(-1, 2)
 
     def reach_of_motion(self, space: Any, start: Any, end: Any) -> float:
-        """Return how far any point of the robot moves along a motion at most, world units.
+        """Return how far any point of a robot with heading moves along a motion, world units.
 
         Args:
             space: from :meth:`make_space`.
@@ -153,7 +153,7 @@ class Workspace:
             turned = robot.circumscribed_radius / robot.turning_radius
             return float(space.distance(first, last)) * (1 + turned)
         a, b = self.read_states([first, last])
-        turn = abs(remainder(b[2] - a[2], tau)) if robot.has_heading else 0.0
+        turn = abs(remainder(b[2] - a[2], tau))
         return float(np.hypot(*(b - a)[:2])) + robot.circumscribed_radius * turn
 
     def is_free(self, setup: Any, path: NDArray[np.float64]) -> bool:

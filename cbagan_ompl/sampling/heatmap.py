@@ -93,7 +93,10 @@ class Heatmap:
 
     @classmethod
     def load(cls, path: str | PathLike[str], grid: GridMap) -> Heatmap:
-        """Read a heat map of a grid: a grey image (black 0, white 1) or a NumPy ``.npy`` array.
+        """Read a heat map of a grid: a gray image (black 0, white 1) or a NumPy ``.npy`` array.
+
+        Pictures of a region as in the published data sets, green on white with black obstacles, are
+        read as well: 1 in the region, 0 elsewhere. Other colours are an error.
 
         Args:
             path: the file; images are PNG, JPEG, BMP, PGM or PPM, recognised by their first bytes.
@@ -334,16 +337,3 @@ class Heatmap:
     def __repr__(self) -> str:
         fraction = self.region.sum() / self.grid.free.sum()
         return f"Heatmap({self.grid.name!r}, region {fraction:.0%} of free space)"
-
-
-def check_heatmap(heatmap: object) -> None:
-    """Raise if a value is no heat map.
-
-    Raises:
-        HeatmapError: it is none; the message says how to make one of an array.
-    """
-    if not isinstance(heatmap, Heatmap):
-        raise HeatmapError(
-            f"expected a Heatmap, got {show(heatmap)}; an array of values becomes one with "
-            "Heatmap(values, grid)"
-        )

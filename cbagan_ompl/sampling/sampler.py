@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .adaptation import AdaptiveMixture
+from .checks import check_heatmap
 from .headings import HeadingSampler
-from .heatmap import Heatmap, check_heatmap
+from .heatmap import Heatmap
 from .monitor import Monitor, NoMonitor
 from .options import SamplerOptions
 from .pixel_sampler import PixelSampler

@@ -122,6 +122,22 @@ def test_csv(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*QUICK, "--csv", "missing/path.csv"]) == 2
 
 
+def test_warnings_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cv2.imwrite(str(tmp_path / "hall.pgm"), np.full((40, 60), 205, np.uint8))
+    (tmp_path / "hall.yaml").write_text(
+        "image: hall.pgm\nresolution: 1\norigin: [0, 0, 0]\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.25\n"
+    )
+    words = ["plan", str(tmp_path / "hall.yaml"), "--sampler", "corridor", "--planner", "RRT"]
+    words += ["--start", "5,5", "--goal", "50,30"]
+    assert main(words) == 0
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("cbagan-ompl plan: warning: ")
+    assert "100% of the pixels have the gray level 205" in line
+    assert main([*words, "--unknown-is-free"]) == 0
+    assert capsys.readouterr().err == ""
+
+
 def test_heatmap_file(tmp_path: Path) -> None:
     grid = GridMap.load(MAP)
     task = tasks_of(MAP, grid)[0]

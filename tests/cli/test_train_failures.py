@@ -160,6 +160,6 @@ def test_without_torch_every_command_says_what_to_install(
             env={**os.environ, "PYTHONPATH": f"{tmp_path}:{os.environ.get('PYTHONPATH', '')}"},
         )
         assert done.returncode == 2, done.stderr
-        assert "pip install 'cbagan-ompl[torch]'" in done.stderr
+        assert "pip install -e '.[torch]'" in done.stderr
         assert len(done.stderr.splitlines()) == 1
     assert not (tmp_path / "run").exists()
