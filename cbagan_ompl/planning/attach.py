@@ -10,14 +10,17 @@ from typing import Any
 
 from ..errors import PlannerError, show
 from ..sampling.adaptation import AdaptiveMixture
+from ..sampling.budget import EARNED_BY_UNIFORM_UNSEEN, LearnedBudget
 from ..sampling.heatmap import Heatmap, check_heatmap
 from ..sampling.options import OPTIMIZING_SHARPNESS, SamplerOptions
 from ..sampling.sampler import HeatmapSampler
 from . import compat, ompl_samplers
+from .bounds_steering import SteeringMonitor, install_steering
 from .compat import ob, og, ou
 from .goal_injection import InjectedGoal
 from .goal_monitor import GoalMonitor, goal_monitor
 from .hooks import (
+    BOUNDS_STEERING,
     GOAL_INJECTION,
     STATE_SAMPLER,
     VALID_STATE_SAMPLER,
@@ -170,12 +173,13 @@ def attach(
     space = setup.getStateSpace()
     states = state_access(space, rng)
     release_forgotten()
-    injects = hook == GOAL_INJECTION
-    monitor = (goal_monitor if injects else PlannerMonitor)(setup, states)
+    monitor = _MONITORS.get(hook, PlannerMonitor)(setup, states)
+    budget = _budget_of(planner, name) if options.adaptation.stagnation else None
     mixture = None
-    if injects:
-        mixture = AdaptiveMixture(heatmap, options.adaptation, _reach_of(planner), monitor)
-    sampler = HeatmapSampler(heatmap, replace(options, seed=rng), monitor, mixture)
+    if hook in _MONITORS:  # callbacks see the tree
+        reach = _reach_of(planner)
+        mixture = AdaptiveMixture(heatmap, options.adaptation, reach, monitor, budget)
+    sampler = HeatmapSampler(heatmap, replace(options, seed=rng), monitor, mixture, budget)
     sampler.keep_inside(*position_bounds(space))
     # Samplers and solutions that are there already would keep the planner from asking for samples.
     planner.clear()
@@ -227,6 +231,12 @@ def _reach_of(planner: Any) -> float:
     # Before its setup a planner may have no range yet; OMPL then takes a fraction of the space.
     si = planner.getSpaceInformation()
     return _REACH * float(planner.getRange() or _OMPL_RANGE * si.getMaximumExtent())
+
+
+def _budget_of(planner: Any, name: str) -> LearnedBudget:
+    if stops_at_first(name) or hasattr(planner, "bestCost"):
+        return LearnedBudget()
+    return LearnedBudget(EARNED_BY_UNIFORM_UNSEEN)
 
 
 @dataclass(frozen=True)
@@ -303,7 +313,15 @@ def _inject_goals(wiring: _Wiring) -> Callable[[], None]:
     return undo
 
 
+def _steer_bounds(wiring: _Wiring) -> Callable[[], None]:
+    assert isinstance(wiring.monitor, SteeringMonitor)
+    return install_steering(wiring.setup, wiring.states, wiring.sampler, wiring.monitor)
+
+
+_MONITORS = {GOAL_INJECTION: goal_monitor, BOUNDS_STEERING: SteeringMonitor}
+
 _INSTALL = {
+    BOUNDS_STEERING: _steer_bounds,
     STATE_SAMPLER: _use_state_sampler,
     VALID_STATE_SAMPLER: _use_valid_state_sampler,
     GOAL_INJECTION: _inject_goals,

@@ -15,6 +15,8 @@ VALID_STATE_SAMPLER = "valid-state-sampler"
 #: The planner samples its goal with a probability that can be set, and grows its tree towards the
 #: sample. It asks the goal about each new node as well, so that samples can follow the tree.
 GOAL_INJECTION = "goal-injection"
+#: The planner samples between bounds of its space that callbacks can set for each sample.
+BOUNDS_STEERING = "bounds-steering"
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,7 @@ class PlannerTraits:
     Attributes:
         hook: what it samples from: :data:`STATE_SAMPLER`, :data:`VALID_STATE_SAMPLER` or
             :data:`GOAL_INJECTION`.
+        without_allocator: the hook on builds where no StateSampler can be set.
         stops_at_first: whether its solve ends with the first path.
         keeps_sampler: whether it makes its sampler when it is set up and keeps it from then on.
         hangs_with: the bindings, see :data:`.compat.BINDINGS`, with which a solve never returns
@@ -35,6 +38,7 @@ class PlannerTraits:
     """
 
     hook: str
+    without_allocator: str | None = None
     stops_at_first: bool = False
     keeps_sampler: bool = False
     hangs_with: str | None = None
@@ -63,7 +67,9 @@ PLANNERS = {
     "PRMstar": PlannerTraits(VALID_STATE_SAMPLER, hangs_with="nanobind", asks_in_thread=True),
     "ProjEST": PlannerTraits(VALID_STATE_SAMPLER, stops_at_first=True),
     "RRT": PlannerTraits(GOAL_INJECTION, stops_at_first=True),
-    "RRTConnect": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
+    "RRTConnect": PlannerTraits(
+        STATE_SAMPLER, without_allocator=BOUNDS_STEERING, stops_at_first=True
+    ),
     "RRTXstatic": PlannerTraits(STATE_SAMPLER),
     "RRTsharp": PlannerTraits(STATE_SAMPLER),
     "RRTstar": PlannerTraits(GOAL_INJECTION),
@@ -91,13 +97,14 @@ def hook_of(planner: str) -> str:
         raise PlannerError(
             f"no hook reaches {planner}: its samplers are made inside OMPL. {_list_reached()}"
         )
-    if traits.hook == STATE_SAMPLER and not HAS_STATE_SAMPLER_ALLOCATOR:
+    hook = _available_hook(traits)
+    if hook is None:
         raise PlannerError(
             f"{planner} samples from a StateSampler, which OMPL {ompl_version()} does not let "
             "Python set: it needs a build that binds StateSpace.setStateSamplerAllocator, such "
             f"as ompl 1.7.0. {_list_reached()}"
         )
-    return traits.hook
+    return hook
 
 
 def reached_planners() -> dict[str, str]:
@@ -107,12 +114,8 @@ def reached_planners() -> dict[str, str]:
         >>> reached_planners()["RRTstar"]
         'goal-injection'
     """
-    hooks = {name: PLANNERS[name].hook for name in sorted(planner_names() & PLANNERS.keys())}
-    return {
-        name: hook
-        for name, hook in hooks.items()
-        if hook != STATE_SAMPLER or HAS_STATE_SAMPLER_ALLOCATOR
-    }
+    hooks = {name: _available_hook(PLANNERS[name]) for name in planner_names() & PLANNERS.keys()}
+    return {name: hook for name, hook in sorted(hooks.items()) if hook is not None}
 
 
 def stops_at_first(planner: str) -> bool:
@@ -147,6 +150,12 @@ def class_name(planner: Any) -> str:
         (kind.__name__ for kind in type(planner).__mro__ if kind.__name__ in names),
         type(planner).__name__,
     )
+
+
+def _available_hook(traits: PlannerTraits) -> str | None:
+    if traits.hook == STATE_SAMPLER and not HAS_STATE_SAMPLER_ALLOCATOR:
+        return traits.without_allocator
+    return traits.hook
 
 
 def _list_reached() -> str:

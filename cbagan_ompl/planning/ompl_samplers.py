@@ -160,7 +160,12 @@ def state_sampler_allocator(
         >>> allocator = state_sampler_allocator(heatmap, seed=0)
     """
     shared = _heatmap_sampler(heatmap, options, changes)
-    return compat.state_sampler_allocator(lambda space: HeatmapStateSampler(space, shared))
+
+    def allocate(space: Any) -> HeatmapStateSampler:
+        shared.restart()  # a planner makes its sampler when it begins anew
+        return HeatmapStateSampler(space, shared)
+
+    return compat.state_sampler_allocator(allocate)
 
 
 def valid_state_sampler_allocator(
@@ -177,7 +182,12 @@ def valid_state_sampler_allocator(
         >>> allocator = valid_state_sampler_allocator(heatmap, seed=0)
     """
     shared = _heatmap_sampler(heatmap, options, changes)
-    return compat.valid_state_sampler_allocator(lambda si: HeatmapValidStateSampler(si, shared))
+
+    def allocate(si: Any) -> HeatmapValidStateSampler:
+        shared.restart()  # a planner makes its sampler when it begins anew
+        return HeatmapValidStateSampler(si, shared)
+
+    return compat.valid_state_sampler_allocator(allocate)
 
 
 def _heatmap_sampler(
