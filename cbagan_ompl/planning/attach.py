@@ -13,6 +13,7 @@ from ..sampling.adaptation import AdaptiveMixture
 from ..sampling.budget import EARNED_BY_UNIFORM_UNSEEN, LearnedBudget
 from ..sampling.heatmap import Heatmap, check_heatmap
 from ..sampling.options import OPTIMIZING_SHARPNESS, SamplerOptions
+from ..sampling.roadmap import RoadmapMixture
 from ..sampling.sampler import HeatmapSampler
 from . import compat, ompl_samplers
 from .bounds_steering import SteeringMonitor, install_steering
@@ -27,6 +28,7 @@ from .hooks import (
     class_name,
     hook_of,
     keeps_sampler,
+    samples_are_nodes,
     stops_at_first,
 )
 from .monitor import PlannerMonitor, is_informed, is_monitored, release_forgotten
@@ -175,10 +177,12 @@ def attach(
     release_forgotten()
     monitor = _MONITORS.get(hook, PlannerMonitor)(setup, states)
     budget = _budget_of(planner, name) if options.adaptation.stagnation else None
-    mixture = None
+    mixture: AdaptiveMixture | RoadmapMixture | None = None
     if hook in _MONITORS:  # callbacks see the tree
         reach = _reach_of(planner)
         mixture = AdaptiveMixture(heatmap, options.adaptation, reach, monitor, budget)
+    elif samples_are_nodes(name) and options.adaptation.coverage:
+        mixture = RoadmapMixture(heatmap, _reach_of(planner), budget)
     sampler = HeatmapSampler(heatmap, replace(options, seed=rng), monitor, mixture, budget)
     sampler.keep_inside(*position_bounds(space))
     # Samplers and solutions that are there already would keep the planner from asking for samples.
@@ -230,13 +234,14 @@ def _reach_of(planner: Any) -> float:
     """Return how far around a node a tree need not grow again, world units: most of its range."""
     # Before its setup a planner may have no range yet; OMPL then takes a fraction of the space.
     si = planner.getSpaceInformation()
-    return _REACH * float(planner.getRange() or _OMPL_RANGE * si.getMaximumExtent())
+    range = planner.getRange() if hasattr(planner, "getRange") else 0.0
+    return _REACH * float(range or _OMPL_RANGE * si.getMaximumExtent())
 
 
 def _budget_of(planner: Any, name: str) -> LearnedBudget:
     if stops_at_first(name) or hasattr(planner, "bestCost"):
         return LearnedBudget()
-    return LearnedBudget(EARNED_BY_UNIFORM_UNSEEN)
+    return LearnedBudget(EARNED_BY_UNIFORM_UNSEEN, is_halved=False)
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,7 @@ class PlannerTraits:
         without_allocator: the hook on builds where no StateSampler can be set.
         stops_at_first: whether its solve ends with the first path.
         keeps_sampler: whether it makes its sampler when it is set up and keeps it from then on.
+        samples_are_nodes: whether its samples become the nodes of a roadmap, where they are valid.
         hangs_with: the bindings, see :data:`.compat.BINDINGS`, with which a solve never returns
             when its termination condition is a Python function; None for no bindings.
         hangs_at_optimum: whether a solve never returns once it has a path as short as the straight
@@ -41,10 +42,17 @@ class PlannerTraits:
     without_allocator: str | None = None
     stops_at_first: bool = False
     keeps_sampler: bool = False
+    samples_are_nodes: bool = False
     hangs_with: str | None = None
     hangs_at_optimum: bool = False
     asks_in_thread: bool = False
 
+
+_ROADMAP: dict[str, Any] = {
+    "hook": VALID_STATE_SAMPLER,
+    "samples_are_nodes": True,
+    "asks_in_thread": True,
+}
 
 #: Every planner that some hook reaches on some build, by OMPL's name of its class.
 PLANNERS = {
@@ -57,14 +65,20 @@ PLANNERS = {
     "KPIECE1": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
     "LBKPIECE1": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
     "LBTRRT": PlannerTraits(STATE_SAMPLER),
-    "LazyPRM": PlannerTraits(STATE_SAMPLER, stops_at_first=True, keeps_sampler=True),
-    "LazyPRMstar": PlannerTraits(STATE_SAMPLER, keeps_sampler=True),
+    "LazyPRM": PlannerTraits(
+        STATE_SAMPLER, stops_at_first=True, keeps_sampler=True, samples_are_nodes=True
+    ),
+    "LazyPRMstar": PlannerTraits(STATE_SAMPLER, keeps_sampler=True, samples_are_nodes=True),
     "LazyRRT": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
     "PDST": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
     "PRM": PlannerTraits(
-        VALID_STATE_SAMPLER, stops_at_first=True, hangs_with="nanobind", asks_in_thread=True
+        VALID_STATE_SAMPLER,
+        stops_at_first=True,
+        samples_are_nodes=True,
+        hangs_with="nanobind",
+        asks_in_thread=True,
     ),
-    "PRMstar": PlannerTraits(VALID_STATE_SAMPLER, hangs_with="nanobind", asks_in_thread=True),
+    "PRMstar": PlannerTraits(**_ROADMAP, hangs_with="nanobind"),
     "ProjEST": PlannerTraits(VALID_STATE_SAMPLER, stops_at_first=True),
     "RRT": PlannerTraits(GOAL_INJECTION, stops_at_first=True),
     "RRTConnect": PlannerTraits(
@@ -75,8 +89,8 @@ PLANNERS = {
     "RRTstar": PlannerTraits(GOAL_INJECTION),
     "SBL": PlannerTraits(VALID_STATE_SAMPLER, stops_at_first=True),
     "SORRTstar": PlannerTraits(GOAL_INJECTION, hangs_at_optimum=True),
-    "SPARS": PlannerTraits(VALID_STATE_SAMPLER, hangs_with="boost", asks_in_thread=True),
-    "SPARStwo": PlannerTraits(VALID_STATE_SAMPLER, hangs_with="boost", asks_in_thread=True),
+    "SPARS": PlannerTraits(**_ROADMAP, hangs_with="boost"),
+    "SPARStwo": PlannerTraits(**_ROADMAP, hangs_with="boost"),
     "SST": PlannerTraits(STATE_SAMPLER),
     "STRIDE": PlannerTraits(VALID_STATE_SAMPLER, stops_at_first=True),
     "TRRT": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
@@ -126,6 +140,11 @@ def stops_at_first(planner: str) -> bool:
 def keeps_sampler(planner: str) -> bool:
     """Return whether a planner makes its sampler when it is set up and keeps it from then on."""
     return planner in PLANNERS and PLANNERS[planner].keeps_sampler
+
+
+def samples_are_nodes(planner: str) -> bool:
+    """Return whether the samples of a planner become the nodes of a roadmap."""
+    return planner in PLANNERS and PLANNERS[planner].samples_are_nodes
 
 
 def hangs_on_python_termination(planner: str) -> bool:

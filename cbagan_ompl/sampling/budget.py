@@ -23,6 +23,7 @@ class LearnedBudget:
 
     Args:
         earned_by_uniform: learned samples that a uniform sample earns.
+        is_halved: whether that halves when learned samples have done what they can.
 
     Example:
         >>> budget = LearnedBudget()
@@ -34,8 +35,11 @@ class LearnedBudget:
         (True, True, False)
     """
 
-    def __init__(self, earned_by_uniform: float = EARNED_BY_UNIFORM) -> None:
-        self._earned_by_uniform = earned_by_uniform
+    def __init__(
+        self, earned_by_uniform: float = EARNED_BY_UNIFORM, is_halved: bool = True
+    ) -> None:
+        self._earned_at_first = self._earned_by_uniform = earned_by_uniform
+        self._is_halved = is_halved
         self._left: float = ADVANCE
 
     def spend(self) -> bool:
@@ -53,6 +57,13 @@ class LearnedBudget:
         """Note a node in a new part of the region."""
         self._left = min(self._left + EARNED_BY_NODE, ADVANCE)
 
+    def use_up(self) -> None:
+        """Note that learned samples have done what they can: more are to be earned."""
+        self._left = 0
+        if self._is_halved:
+            self._earned_by_uniform /= 2
+
     def restart(self) -> None:
         """Note that the planner begins anew."""
         self._left = ADVANCE
+        self._earned_by_uniform = self._earned_at_first

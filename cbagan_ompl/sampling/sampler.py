@@ -15,6 +15,7 @@ from .heatmap import Heatmap, check_heatmap
 from .monitor import Monitor, NoMonitor
 from .options import SamplerOptions
 from .pixel_sampler import PixelSampler
+from .roadmap import RoadmapMixture
 
 # Candidates of which a local sample is one, with probability proportional to the heat map.
 _LOCAL_CANDIDATES = 32
@@ -58,7 +59,7 @@ class HeatmapSampler:
         heatmap: Heatmap,
         options: SamplerOptions | None = None,
         monitor: Monitor | None = None,
-        mixture: AdaptiveMixture | None = None,
+        mixture: AdaptiveMixture | RoadmapMixture | None = None,
         budget: LearnedBudget | None = None,
         **changes: Any,
     ) -> None:
