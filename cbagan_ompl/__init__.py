@@ -21,6 +21,7 @@ from .errors import (
     MissingDependencyError,
     ModelError,
     PlannerError,
+    RobotError,
     TaskError,
 )
 from .planning.exit_protection import protect_exit
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from .planning.plan_result import PlanResult
     from .planning.validity import GridMotionValidator, GridValidityChecker
     from .plotting import save_figure
+    from .robots.robot import Robot
     from .sampling.heatmap import Heatmap
     from .sampling.options import Adaptation, SamplerOptions
 
@@ -66,6 +68,8 @@ __all__ = [
     "PlanResult",
     "PlannerError",
     "Predictor",
+    "Robot",
+    "RobotError",
     "SamplerOptions",
     "Task",
     "TaskError",
@@ -98,6 +102,7 @@ _HOMES = {
     ),
     "planning.validity": ("GridMotionValidator", "GridValidityChecker"),
     "plotting": ("save_figure",),
+    "robots.robot": ("Robot",),
     "sampling.heatmap": ("Heatmap",),
     "sampling.options": ("Adaptation", "SamplerOptions"),
 }

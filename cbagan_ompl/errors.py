@@ -39,6 +39,10 @@ class TaskError(CbaganOmplError):
     """A start or goal that cannot be planned for on this map."""
 
 
+class RobotError(CbaganOmplError):
+    """A shape, a turning radius or a footprint file that is none, or does not fit the map."""
+
+
 class HeatmapError(CbaganOmplError):
     """Values that are not a heat map of the grid that they came with."""
 

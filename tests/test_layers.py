@@ -19,13 +19,17 @@ BELOW = {
     "common": {"errors"},
     "map_generators": {"errors", "common"},
     "maps": {"errors", "common"},
-    "sampling": {"errors", "common", "maps"},
+    "robots": {"errors", "common", "maps"},
+    "sampling": {"errors", "common", "maps", "robots"},
     # The limits of a model are those of the networks' configuration, which loads no torch.
-    "inference": {"errors", "common", "maps", "sampling", "networks"},
-    "planning": {"errors", "common", "maps", "sampling", "inference"},
-    "benchmarking": {"errors", "common", "maps", "sampling", "inference", "planning"},
+    "inference": {"errors", "common", "maps", "robots", "sampling", "networks"},
+    "planning": {"errors", "common", "maps", "robots", "sampling", "inference"},
+    "benchmarking": {
+        *("errors", "common", "maps", "robots", "sampling", "inference", "planning"),
+    },
     "datasets": {
-        *("errors", "common", "maps", "map_generators", "sampling", "inference", "planning"),
+        *("errors", "common", "maps", "map_generators"),
+        *("robots", "sampling", "inference", "planning"),
     },
 }
 BELOW["evaluation"] = BELOW["datasets"] | {"datasets"}

@@ -30,7 +30,7 @@ from tqdm import tqdm
 from cbagan_ompl import GridMap, Heatmap, PlanResult, Predictor, load_model, plan
 from cbagan_ompl.benchmarking.tasks import BenchmarkTask, select_tasks
 from cbagan_ompl.common.files import write_json
-from cbagan_ompl.maps.connectivity import in_one_component, label_components
+from cbagan_ompl.maps.connectivity import in_one_component
 from cbagan_ompl.networks.config import NetworkConfig
 from cbagan_ompl.networks.export_model import RegionModel
 from cbagan_ompl.networks.factory import make_generator
@@ -89,8 +89,8 @@ def predict_regions(
 
 def connects(heatmap: Heatmap, start: NDArray[np.float64], goal: NDArray[np.float64]) -> bool:
     """Return whether the region contains start and goal and an 8-connected path between them."""
-    labels = label_components(heatmap.region, connectivity=8)
-    return in_one_component(labels, *pixel_pair(heatmap.grid.to_pixel((start, goal))))
+    pixels = pixel_pair(heatmap.grid.to_pixel((start, goal)))
+    return in_one_component(heatmap.region, *pixels, connectivity=8)
 
 
 def timed(times: list[float], work: Callable[..., Any], *arguments: Any, **options: Any) -> Any:

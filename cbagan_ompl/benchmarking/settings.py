@@ -12,6 +12,7 @@ from ..common.validation import is_finite_number, positive_number, whole_number
 from ..common.yaml_text import parse_yaml
 from ..errors import ConfigError, show
 from ..planning.heatmap_sources import LEARNED, UNIFORM
+from ..planning.planner_names import planner_name
 from ..sampling.options import SamplerOptions
 
 #: OMPL's own sampler, which the others are compared with.
@@ -33,7 +34,7 @@ class Settings:
     """Options of a benchmark.
 
     Attributes:
-        planners: OMPL's names.
+        planners: by OMPL's names; other spellings, such as ``RRT*``, are replaced by those.
         samplers: of :data:`cbagan_ompl.planning.heatmap_sources.SAMPLERS`, and the keys of
             ``models`` and of ``heatmap_dirs``.
         runs: number of runs of each planner with each sampler on each task.
@@ -72,6 +73,7 @@ class Settings:
     within: int = DEFAULT_WITHIN
 
     def __post_init__(self) -> None:
+        self._spell_planners()
         for what, names in (("planners", self.planners), ("samplers", self.samplers)):
             if not names or len(set(names)) < len(names):
                 raise ConfigError(f"{what} must be named, and each once, got {show(list(names))}")
@@ -99,6 +101,12 @@ class Settings:
                     f"a parameter of {show(planner)} is set, which is not among the planners "
                     f"{', '.join(self.planners)}"
                 )
+
+    def _spell_planners(self) -> None:
+        planners = tuple(planner_name(name) for name in self.planners)
+        parameters = {planner_name(name): values for name, values in self.parameters.items()}
+        object.__setattr__(self, "planners", planners)
+        object.__setattr__(self, "parameters", parameters)
 
     @property
     def seed(self) -> int:
@@ -153,5 +161,5 @@ def parse_parameters(assignments: list[str]) -> dict[str, dict[str, Any]]:
                 f"--set {show(key)}: the value is a finite number, true, false or a word, got "
                 f"{show(value)}"
             )
-        parameters.setdefault(planner, {})[name] = value
+        parameters.setdefault(planner_name(planner), {})[name] = value
     return parameters

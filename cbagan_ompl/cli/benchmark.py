@@ -18,6 +18,7 @@ from ..planning.heatmap_sources import LEARNED
 from .options import (
     add_map_options,
     add_sampler_options,
+    describe_planners,
     describe_samplers,
     map_options,
     sampler_options,
@@ -56,6 +57,7 @@ def add_benchmark_parser(commands: Any) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.reads_files = True
+    parser.describe_more = describe_planners
     parser.set_defaults(run=_benchmark)
     parser.add_argument("maps", nargs="*", metavar="MAP", help="map file, or bundled:NAME")
 
@@ -84,7 +86,7 @@ def add_benchmark_parser(commands: Any) -> None:
         type=_names,
         default=defaults.planners,
         metavar="A,B",
-        help=f"OMPL's names (default: {','.join(defaults.planners)})",
+        help=f"OMPL's names of them, see below (default: {','.join(defaults.planners)})",
     )
     comparison.add_argument(
         "--samplers",

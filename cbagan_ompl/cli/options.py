@@ -80,6 +80,13 @@ def sampler_options(args: argparse.Namespace) -> SamplerOptions:
     )
 
 
+def describe_planners() -> list[str]:
+    """Return the planners of the installed OMPL, for the end of a help; this loads OMPL."""
+    from ..planning.hooks import describe_planners
+
+    return describe_planners()
+
+
 def describe_samplers() -> str:
     """Return the names of the samplers with what each samples, for the help of an option."""
     return "; ".join(f"{name}: {what}" for name, what in SAMPLERS.items())

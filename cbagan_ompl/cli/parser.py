@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import shutil
 import sys
-from collections.abc import Sequence
+import textwrap
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -20,9 +22,18 @@ class Parser(argparse.ArgumentParser):
 
     Attributes:
         reads_files: whether ``@FILE`` stands for the arguments in a file, one a line.
+        describe_more: makes the paragraphs at the end of the help, when the help is asked for.
     """
 
     reads_files = False
+    describe_more: Callable[[], list[str]] | None = None
+
+    def format_help(self) -> str:
+        """Return the help, with what only a look at the installed packages tells."""
+        if self.describe_more is not None:
+            width = shutil.get_terminal_size().columns - 2
+            self.epilog = "\n\n".join(textwrap.fill(text, width) for text in self.describe_more())
+        return super().format_help()
 
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: Any = None

@@ -14,6 +14,7 @@ from ..sampling.heatmap import Heatmap
 from .options import (
     add_map_options,
     add_sampler_options,
+    describe_planners,
     describe_samplers,
     map_options,
     sampler_options,
@@ -41,10 +42,16 @@ def add_plan_parser(commands: Any) -> None:
         description=_PLAN_HELP.format(maps=", ".join(f"bundled:{name}" for name in bundled_maps())),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    parser.describe_more = describe_planners
     parser.set_defaults(run=_plan)
     parser.add_argument("map", metavar="MAP", help="map file, or bundled:NAME")
+    _add_task(parser.add_argument_group("task"))
+    _add_planner(parser.add_argument_group("planner"))
+    _add_sampler(parser.add_argument_group("sampler"))
+    _add_output(parser.add_argument_group("output"))
 
-    task = parser.add_argument_group("task")
+
+def _add_task(task: Any) -> None:
     task.add_argument("--start", type=_point, metavar="X,Y", help="where the path begins")
     task.add_argument("--goal", type=_point, metavar="X,Y", help="where it ends")
     task.add_argument(
@@ -57,11 +64,23 @@ def add_plan_parser(commands: Any) -> None:
     task.add_argument(
         "--radius", type=float, default=0.0, metavar="R", help="radius of the robot (default: 0)"
     )
+    task.add_argument(
+        "--snap",
+        type=float,
+        default=0.0,
+        metavar="D",
+        help="move a start or goal in an obstacle or its margin to the nearest place where the "
+        "robot may be, no farther than D (default: 0, an error)",
+    )
     add_map_options(task)
 
-    planner = parser.add_argument_group("planner")
+
+def _add_planner(planner: Any) -> None:
     planner.add_argument(
-        "--planner", default="RRTstar", metavar="NAME", help="OMPL's name (default: RRTstar)"
+        "--planner",
+        default="RRTstar",
+        metavar="NAME",
+        help="OMPL's name of it, see below (default: RRTstar)",
     )
     planner.add_argument(
         "--time", type=float, default=1.0, metavar="S", help="limit in seconds (default: 1)"
@@ -75,7 +94,8 @@ def add_plan_parser(commands: Any) -> None:
     )
     planner.add_argument("--seed", type=int, metavar="N", help="seed (default: a fresh one)")
 
-    sampler = parser.add_argument_group("sampler")
+
+def _add_sampler(sampler: Any) -> None:
     sampler.add_argument(
         "--sampler",
         default="learned",
@@ -90,10 +110,12 @@ def add_plan_parser(commands: Any) -> None:
     )
     add_sampler_options(sampler)
 
-    output = parser.add_argument_group("output")
+
+def _add_output(output: Any) -> None:
     output.add_argument("--output", metavar="FILE", help="figure of the plan (.png, .pdf, .svg)")
     output.add_argument("--no-tree", action="store_true", help="leave the tree out of the figure")
     output.add_argument("--json", metavar="FILE", help="result as JSON")
+    output.add_argument("--csv", metavar="FILE", help="way points as a table: x,y,index")
 
 
 def _point(text: str) -> tuple[float, float]:
@@ -113,7 +135,8 @@ def _plan(args: argparse.Namespace) -> int:
         from ..common.figures import check_figure_path
 
         check_figure_path(args.output)
-    check_output(args.output, [args.map, args.heatmap or ""], force=args.force)
+    for file in (args.output, args.csv):
+        check_output(file, [args.map, args.heatmap or ""], force=args.force)
     grid = GridMap.load(args.map, **map_options(args))
     start, goal = _endpoints(args, grid)
     result = plan(
@@ -126,6 +149,7 @@ def _plan(args: argparse.Namespace) -> int:
         iterations=args.iterations,
         range=args.range,
         radius=args.radius,
+        snap=args.snap,
         model=args.model,
         heatmap=None if args.heatmap is None else Heatmap.load(args.heatmap, grid),
         simplify=args.simplify,
@@ -135,6 +159,8 @@ def _plan(args: argparse.Namespace) -> int:
     values = result.to_dict()
     if args.json is not None:
         write_report(args.json, values)
+    if args.csv is not None:
+        result.save_csv(args.csv)
     if args.output is not None:
         from ..plotting import save_figure
 
@@ -164,12 +190,13 @@ def _endpoints(
 
 def _print_summary(values: dict[str, Any], figure: str | None) -> None:
     solved = f"yes, cost {values['cost']:.6g}" if values["solved"] else f"no ({_why(values)})"
-    first, counts = values["first_solution_s"], values["sample_counts"]
+    first = values["first_solution_s"]
     rows = {
         "solved": solved,
+        **{f"{role} moved": _describe_move(values, role) for role in values["snapped"]},
         "planner": f"{values['planner']}, OMPL {values['ompl_version']}",
         "sampler": f"{values['sampler']}, hook {values['hook'] or 'none'}",
-        "samples": f"{counts['learned']} learned, {counts['uniform']} uniform",
+        "samples": _describe_samples(values),
         "nodes": values["nodes"],
         "inference": f"{values['inference_s']:.4f} s",
         "planning": f"{values['planning_s']:.4f} s"
@@ -179,6 +206,28 @@ def _print_summary(values: dict[str, Any], figure: str | None) -> None:
     }
     for name, value in rows.items():
         print(f"{name:<14} {value}")
+
+
+# What the samples of the heat map are called, by the name of the sampler.
+_SAMPLES = {
+    "learned": "learned",
+    "corridor": "from the corridor",
+    "straight-line": "from the straight line",
+}
+
+
+def _describe_samples(values: dict[str, Any]) -> str:
+    counts, sampler = values["sample_counts"], values["sampler"]
+    if values["hook"] is None:
+        return "OMPL's own, not counted"
+    kind = _SAMPLES.get(sampler, "from the heat map")
+    return f"{counts['learned']} {kind}, {counts['uniform']} uniform"
+
+
+def _describe_move(values: dict[str, Any], role: str) -> str:
+    move = values["snapped"][role]
+    given, place = (",".join(f"{x:.6g}" for x in point) for point in (move["given"], values[role]))
+    return f"by {move['distance']:.4g}, from {given} to {place}"
 
 
 def _why(values: dict[str, Any]) -> str:

@@ -19,7 +19,9 @@ MADE_BY = f"cbagan-ompl {__version__}"
 _SIGNATURE = re.compile(
     rb'\A\{\s*"made_by": "cbagan-ompl |Software\0cbagan-ompl |/Creator \(cbagan-ompl '
     rb"|<dc:title>cbagan-ompl |%%Creator: cbagan-ompl |\xff\xfe\0.cbagan-ompl "
-    rb"|Made by cbagan-ompl ",
+    rb"|Made by cbagan-ompl "
+    # A table of a path has no place for a name: its first line stands for it.
+    rb"|\Ax,y(,yaw)?,index\n",
     re.DOTALL,
 )
 _SEARCHED = 2**16

@@ -2,32 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..common.files import as_path
 from ..common.validation import require_torch, truth_value, whole_number
-from ..errors import MapError, ModelError, show
+from ..errors import MapError, ModelError, TaskError, show
 from ..maps.grid_map import GridMap
 from ..networks.config import MAX_IMAGE_SIZE
 from ..sampling.heatmap import Heatmap
 from .model_files import bundled_model, load_script, read_model
 from .probe import Kind, try_model
+from .scaling import enlarged_values, scaled_map, scaled_shape
+from .torch_state import own_torch_state
 
 if TYPE_CHECKING:
     import torch
 
-# Free space keeps at least this value, so that a heat map can be sampled even where the network is
-# certain that no path runs.
+# Values below this become 0: by the labels that networks are trained on, paths through such pixels
+# are a quarter longer than the best. What a network paints far from any path is a thousandth or so;
+# on large maps that would add up to most of the samples, and cost time in every pixel.
+_LEAST_VALUE = 2.0**-5
+
+# Of free space where the network paints nothing at all, so that the heat map can be sampled.
 _FLOOR = 1e-4
 
-# Small maps are enlarged by this factor at most: more shows the network nothing new, and the cost
-# grows with its square.
-_MAX_ENLARGEMENT = 2
+# Tasks in one pass of the network: more are no quicker, and take memory.
+_BATCH = 8
 
 
 def load_model(path: str | PathLike[str] | None = None) -> Predictor:
@@ -133,19 +138,69 @@ class Predictor:
             TaskError: see :meth:`GridMap.check_task`.
             ConfigError: ``repair`` is no truth value.
         """
+        return self._predict(grid, [start], [goal], repair)[0]
+
+    def predict_many(
+        self,
+        grid: GridMap,
+        starts: Iterable[ArrayLike],
+        goals: Iterable[ArrayLike],
+        repair: bool = True,
+    ) -> list[Heatmap]:
+        """Predict for several tasks on one map, in passes of several tasks each.
+
+        Args:
+            grid: the map.
+            starts: (x, y) of each task, world.
+            goals: (x, y) of each task, world.
+            repair: see :meth:`predict`.
+
+        Returns:
+            The heat map of each task.
+
+        Raises:
+            MapError: ``grid`` is no :class:`GridMap`.
+            TaskError: starts and goals are not as many, or see :meth:`GridMap.check_task`.
+            ConfigError: ``repair`` is no truth value.
+
+        Example:
+            >>> from cbagan_ompl import GridMap
+            >>> grid = GridMap.load("bundled:rooms")
+            >>> goals = [(230, 230), (230, 20)]
+            >>> len(load_model().predict_many(grid, [(20, 20)] * 2, goals))
+            2
+        """
+        starts, goals = _list_points("starts", starts), _list_points("goals", goals)
+        if len(starts) != len(goals):
+            raise TaskError(f"each task has a start and a goal, got {len(starts)} and {len(goals)}")
+        return [
+            heatmap
+            for i in range(0, len(starts), _BATCH)
+            for heatmap in self._predict(
+                grid, starts[i : i + _BATCH], goals[i : i + _BATCH], repair
+            )
+        ]
+
+    def _predict(
+        self, grid: GridMap, starts: list[ArrayLike], goals: list[ArrayLike], repair: bool
+    ) -> list[Heatmap]:
+        """Predict for tasks on one map, in one pass of the network."""
         if not isinstance(grid, GridMap):
             raise MapError(
                 f"predict takes a GridMap, got {show(grid)}; make one of an array, true where "
                 "free, with GridMap(array)"
             )
         repair = truth_value("repair", repair)
-        endpoints = grid.to_pixel(grid.check_task(start, goal))
+        tasks = [grid.check_task(*task) for task in zip(starts, goals, strict=True)]
         shape = scaled_shape(grid.shape, int(self.record["working_size"]))
-        scaled = endpoints * (shape[1] / grid.width, shape[0] / grid.height)
-        values = self.probabilities(scaled_free(grid.free, shape)[None], *scaled[:, None])[0]
-        full = cv2.resize(values, grid.shape[::-1], interpolation=cv2.INTER_LINEAR)
-        heatmap = Heatmap(np.clip(full, _FLOOR, 1), grid)
-        return heatmap.connected(start, goal) if repair else heatmap
+        scale = shape[1] / grid.width, shape[0] / grid.height
+        endpoints = grid.to_pixel(np.array(tasks)) * scale
+        free = np.broadcast_to(scaled_map(grid, shape), (len(tasks), *shape))
+        outputs = self.probabilities(free, endpoints[:, 0], endpoints[:, 1])
+        heatmaps = [_make_heatmap(values, grid) for values in outputs]
+        if not repair:
+            return heatmaps
+        return [heatmap.connected(*task) for heatmap, task in zip(heatmaps, tasks, strict=True)]
 
     def probabilities(
         self, free: NDArray[np.bool_], start: NDArray[np.floating], goal: NDArray[np.floating]
@@ -161,19 +216,12 @@ class Predictor:
             (B, H, W), the probability that a pixel belongs to the region.
         """
         import torch
-        from torch.jit import optimized_execution  # type: ignore[attr-defined]
 
         cells = torch.from_numpy(free.astype(np.float32))[:, None]
         endpoints = (torch.from_numpy(points.astype(np.float32)) for points in (start, goal))
-        threads = torch.get_num_threads()
-        torch.set_num_threads(self.inference_threads)
-        try:
-            # Without the optimiser, whose first two calls take ten times as long: a plan makes one.
-            with torch.inference_mode(), optimized_execution(False):
-                values = self._module(cells, *endpoints)
-        finally:
-            torch.set_num_threads(threads)
-        result: NDArray[np.float32] = values[:, 0].numpy()
+        with own_torch_state(self.inference_threads):
+            values = self._module(cells, *endpoints)
+            result: NDArray[np.float32] = values[:, 0].numpy()
         return result
 
     def __repr__(self) -> str:
@@ -183,31 +231,17 @@ class Predictor:
         )
 
 
-def scaled_shape(shape: tuple[int, int], longest: int) -> tuple[int, int]:
-    """Return rows and columns of a map scaled to ``longest`` pixels on its longer side.
-
-    Small maps are doubled at most.
-
-    Example:
-        >>> scaled_shape((512, 256), 256), scaled_shape((30, 20), 256)
-        ((256, 128), (60, 40))
-    """
-    factor = min(longest / max(shape), _MAX_ENLARGEMENT)
-    return max(1, round(factor * shape[0])), max(1, round(factor * shape[1]))
+def _list_points(name: str, points: Iterable[ArrayLike]) -> list[ArrayLike]:
+    """Return the endpoints of several tasks as a list."""
+    try:
+        return list(points)
+    except Exception as error:  # a number, or whatever the class raises
+        raise TaskError(f"{name} is a list of points (x, y), got {show(points)}") from error
 
 
-def scaled_free(free: NDArray[np.bool_], shape: tuple[int, int]) -> NDArray[np.bool_]:
-    """Return a free mask at another size; a pixel is free when any pixel of its block is.
-
-    When a map is scaled down, narrow passages survive, thin walls may not. That is the lesser harm:
-    where the predicted region then crosses a wall, the obstacles of the full map cut it, but
-    through a passage that the network cannot see it predicts no region.
-
-    Args:
-        free: (H, W), true where free.
-        shape: (h, w).
-    """
-    if shape == free.shape:
-        return free
-    rows, columns = (np.arange(n) * size // n for n, size in zip(shape, free.shape, strict=True))
-    return np.logical_or.reduceat(np.logical_or.reduceat(free, rows, axis=0), columns, axis=1)
+def _make_heatmap(values: NDArray[np.float32], grid: GridMap) -> Heatmap:
+    """Return the heat map of a network's output."""
+    full = enlarged_values(values, grid.shape, _LEAST_VALUE)
+    if not np.logical_and(full > 0, grid.free).any():
+        full[:] = _FLOOR
+    return Heatmap(full, grid)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
 #: Start and goal as positions (x, y) in world coordinates, (2,) each.
 Endpoints = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+#: Endpoints that were moved, by their role: the point that was ``given``, and the ``distance``.
+Moves = dict[str, dict[str, Any]]
 
 
 def check_endpoints(grid: GridMap, start: ArrayLike, goal: ArrayLike) -> Endpoints:
@@ -46,9 +49,63 @@ def snap_to_free(
     Raises:
         TaskError: it is no point, outside the map, or nothing within the distance is free.
     """
+    places = _find_places(grid, role, point, distance)
+    return min(places.values(), key=lambda place: place.distance).position
+
+
+def snap_endpoints(
+    grid: GridMap, start: ArrayLike, goal: ArrayLike, distance: float
+) -> tuple[Endpoints, Moves]:
+    """Return start and goal, each moved to the nearest free position where it is blocked.
+
+    Where several parts of free space are near, the endpoints go to the part that connects them, and
+    of several such parts to that with the shortest moves. Whether one does is not checked here.
+
+    Args:
+        grid: the map.
+        start: (x, y), world.
+        goal: (x, y), world.
+        distance: the farthest that each is moved, world units.
+
+    Returns:
+        The endpoints, and for those that were moved, by "start" and "goal", the point that was
+        ``given`` and the ``distance``, world units.
+
+    Raises:
+        TaskError: one of them is no point, outside the map, or nothing near it is free.
+    """
+    points = {"start": start, "goal": goal}
+    places = [_find_places(grid, role, point, distance) for role, point in points.items()]
+    common = places[0].keys() & places[1].keys()
+    if common:
+        part = min(common, key=lambda label: sum(of[label].distance for of in places))
+        chosen = [of[part] for of in places]
+    else:
+        chosen = [min(of.values(), key=lambda place: place.distance) for of in places]
+    moves: Moves = {
+        role: {"given": check_point(role, point).tolist(), "distance": place.distance}
+        for (role, point), place in zip(points.items(), chosen, strict=True)
+        if place.distance > 0
+    }
+    return (chosen[0].position, chosen[1].position), moves
+
+
+class _Place(NamedTuple):
+    """A free position, and how far from a point it is, world units."""
+
+    position: NDArray[np.float64]
+    distance: float
+
+
+def _find_places(grid: GridMap, role: str, point: ArrayLike, distance: float) -> dict[int, _Place]:
+    """Return the nearest place in each connected part of free space that is near a point.
+
+    A point in free space has itself alone.
+    """
     position = _check_position(grid, role, point)
     if grid.is_free(position):
-        return position
+        column, row = grid.to_pixel(position).astype(int).tolist()
+        return {int(grid.components[row, column]): _Place(position, 0.0)}
     centre = grid.to_pixel(position)
     reach = distance / grid.resolution
     left, top = np.maximum(np.floor(centre - reach), 0).astype(int)
@@ -58,12 +115,20 @@ def snap_to_free(
     corners = np.stack((columns + left, rows + top), axis=-1)
     nearest = np.clip(centre, corners + 1e-3, corners + 1 - 1e-3)
     distances = np.hypot(*(nearest - centre).T)
-    if not len(distances) or distances.min() > reach:
+    order = np.argsort(distances, kind="stable")
+    order = order[distances[order] <= reach]
+    if not len(order):
         raise TaskError(
             f"{role} {_format(position)} is {_describe_blocked(grid, position)}, and nothing "
             f"within {distance:g} of it is free; choose another, or snap it from farther away"
         )
-    return np.asarray(grid.to_world(nearest[int(distances.argmin())]), np.float64)
+    labels = grid.components[tuple(corners[order].T[::-1])]
+    parts, first = np.unique(labels, return_index=True)
+    places = grid.to_world(nearest[order[first]])
+    return {
+        int(label): _Place(place, float(np.hypot(*(place - position))))
+        for label, place in zip(parts, places, strict=True)
+    }
 
 
 def _check_free(grid: GridMap, role: str, point: ArrayLike) -> NDArray[np.float64]:
@@ -73,7 +138,7 @@ def _check_free(grid: GridMap, role: str, point: ArrayLike) -> NDArray[np.float6
         raise TaskError(
             f"{role} {_format(position)} is {_describe_blocked(grid, position)} "
             f"(pixel column {column}, row {row}); choose a free point, or let it be moved to the "
-            "nearest one with snap"
+            "nearest one with snap (--snap D)"
         )
     return position
 

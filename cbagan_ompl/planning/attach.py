@@ -30,6 +30,7 @@ from .hooks import (
     keeps_sampler,
     samples_are_nodes,
     stops_at_first,
+    wants_sharp,
 )
 from .monitor import PlannerMonitor, is_informed, is_monitored, release_forgotten
 from .states import StateAccess, position_bounds, state_access
@@ -131,7 +132,7 @@ def attach(
         setup: an ``ompl.geometric.SimpleSetup``.
         heatmap: what to sample, in the coordinates of the setup's space.
         options: how samples follow the heat map. ``sharpness`` None stands for 1 with planners that
-            stop at their first path, and for
+            stop at their first path other than RRTConnect, and for
             :data:`cbagan_ompl.sampling.options.OPTIMIZING_SHARPNESS` with those that go on.
             ``adaptation`` is for planners that goal injection reaches. ``seed`` is that of our
             samples alone; seed OMPL as well for plans that can be repeated.
@@ -169,7 +170,7 @@ def attach(
     name = class_name(planner)
     hook = hook_of(name)
     if options.sharpness is None:
-        sharpness = 1.0 if stops_at_first(name) else OPTIMIZING_SHARPNESS
+        sharpness = OPTIMIZING_SHARPNESS if wants_sharp(name) else 1.0
         options = replace(options, sharpness=sharpness)
     rng = options.generator()
     space = setup.getStateSpace()

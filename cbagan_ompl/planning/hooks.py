@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ..errors import PlannerError
+from ..errors import PlannerError, show
 from .compat import BINDINGS, HAS_STATE_SAMPLER_ALLOCATOR, ompl_version, planner_names
 
 #: The planner asks a StateSampler of its space.
@@ -28,6 +28,7 @@ class PlannerTraits:
             :data:`GOAL_INJECTION`.
         without_allocator: the hook on builds where no StateSampler can be set.
         stops_at_first: whether its solve ends with the first path.
+        is_greedy: whether its trees grow in a few long strides, so that a narrow region serves it.
         keeps_sampler: whether it makes its sampler when it is set up and keeps it from then on.
         samples_are_nodes: whether its samples become the nodes of a roadmap, where they are valid.
         hangs_with: the bindings, see :data:`.compat.BINDINGS`, with which a solve never returns
@@ -41,6 +42,7 @@ class PlannerTraits:
     hook: str
     without_allocator: str | None = None
     stops_at_first: bool = False
+    is_greedy: bool = False
     keeps_sampler: bool = False
     samples_are_nodes: bool = False
     hangs_with: str | None = None
@@ -82,7 +84,7 @@ PLANNERS = {
     "ProjEST": PlannerTraits(VALID_STATE_SAMPLER, stops_at_first=True),
     "RRT": PlannerTraits(GOAL_INJECTION, stops_at_first=True),
     "RRTConnect": PlannerTraits(
-        STATE_SAMPLER, without_allocator=BOUNDS_STEERING, stops_at_first=True
+        STATE_SAMPLER, without_allocator=BOUNDS_STEERING, stops_at_first=True, is_greedy=True
     ),
     "RRTXstatic": PlannerTraits(STATE_SAMPLER),
     "RRTsharp": PlannerTraits(STATE_SAMPLER),
@@ -109,14 +111,14 @@ def hook_of(planner: str) -> str:
     traits = PLANNERS.get(planner)
     if traits is None:
         raise PlannerError(
-            f"no hook reaches {planner}: its samplers are made inside OMPL. {_list_reached()}"
+            f"no hook reaches {planner}: its samplers are made inside OMPL; {_list_reached()}"
         )
     hook = _available_hook(traits)
     if hook is None:
         raise PlannerError(
             f"{planner} samples from a StateSampler, which OMPL {ompl_version()} does not let "
             "Python set: it needs a build that binds StateSpace.setStateSamplerAllocator, such "
-            f"as ompl 1.7.0. {_list_reached()}"
+            f"as ompl 1.7.0; {_list_reached()}"
         )
     return hook
 
@@ -132,9 +134,46 @@ def reached_planners() -> dict[str, str]:
     return {name: hook for name, hook in sorted(hooks.items()) if hook is not None}
 
 
+def check_planner(planner: str, *, follows_heatmap: bool) -> None:
+    """Raise if a planner cannot be used.
+
+    Args:
+        planner: OMPL's name of it.
+        follows_heatmap: whether it is to sample a heat map, and so must be reached by a hook.
+
+    Raises:
+        PlannerError: this build has no such planner, or no hook reaches it; the message lists those
+            that can be used.
+    """
+    names = planner_names()
+    if not (isinstance(planner, str) and planner in names):
+        have = _list_reached() if follows_heatmap else f"there are {', '.join(sorted(names))}"
+        raise PlannerError(
+            f"there is no planner {show(planner)} to use on OMPL {ompl_version()}; {have}"
+        )
+    if follows_heatmap:
+        hook_of(planner)
+
+
+def describe_planners() -> list[str]:
+    """Return what can be planned with on the installed OMPL, as sentences for a help text."""
+    reached = reached_planners()
+    others = sorted(planner_names() - reached.keys())
+    return [
+        f"Planners that sample heat maps on OMPL {ompl_version()}: {', '.join(reached)}.",
+        f"With the uniform sampler also: {', '.join(others)}.",
+        'Other spellings, such as "RRT*" and rrt-connect, are understood.',
+    ]
+
+
 def stops_at_first(planner: str) -> bool:
     """Return whether the solve of a planner ends with its first path."""
     return planner in PLANNERS and PLANNERS[planner].stops_at_first
+
+
+def wants_sharp(planner: str) -> bool:
+    """Return whether a planner is served best by a heat map that is raised to a power."""
+    return not stops_at_first(planner) or PLANNERS[planner].is_greedy
 
 
 def keeps_sampler(planner: str) -> bool:
@@ -178,4 +217,4 @@ def _available_hook(traits: PlannerTraits) -> str | None:
 
 
 def _list_reached() -> str:
-    return f"Reached here: {', '.join(reached_planners())}"
+    return f"heat maps reach {', '.join(reached_planners())}"

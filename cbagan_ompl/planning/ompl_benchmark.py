@@ -21,7 +21,7 @@ from . import compat
 from .attach import Attachment, attach
 from .compat import ou
 from .heatmap_sources import HeatmapSource
-from .hooks import hangs_at_optimum, hook_of
+from .hooks import check_planner, hangs_at_optimum
 from .interrupt_guard import InterruptGuard
 from .monitor import CostHistory
 from .problem import (
@@ -135,10 +135,9 @@ def check_variants(
         PlannerError: an unknown planner, or one that no hook reaches on this OMPL.
         ConfigError: a parameter that a planner does not have.
     """
-    BenchmarkSession(grid, endpoints, variants, options, InterruptGuard())
     for variant in variants:
-        if variant.source is not None:
-            hook_of(variant.planner)
+        check_planner(variant.planner, follows_heatmap=variant.source is not None)
+    BenchmarkSession(grid, endpoints, variants, options, InterruptGuard())
 
 
 def run_benchmark(

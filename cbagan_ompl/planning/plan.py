@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..common.validation import finite_number, positive_number, truth_value, whole_number
 from ..errors import ConfigError, MapError, show
+from ..maps.endpoints import Moves, snap_endpoints
 from ..maps.grid_map import GridMap
 from ..sampling.heatmap import Heatmap
 from ..sampling.options import SamplerOptions
@@ -21,17 +22,19 @@ from . import compat
 from .attach import Attachment, attach
 from .compat import ou
 from .heatmap_sources import LEARNED, UNIFORM, HeatmapSource, heatmap_source
-from .hooks import hangs_at_optimum, hangs_on_python_termination, hook_of, stops_at_first
-from .monitor import CostHistory
+from .hooks import check_planner, hangs_at_optimum
 from .plan_result import PlanResult
+from .planner_names import planner_name
 from .problem import (
     Endpoints,
     checked_path,
+    follow_path,
     make_setup,
     path_length,
     set_range,
     stop_at_optimum,
 )
+from .solving import Limits, SolveRecord, solve
 
 if TYPE_CHECKING:
     from ..inference.predictor import Predictor
@@ -48,6 +51,7 @@ def plan(
     iterations: int | None = None,
     range: float | None = None,
     radius: float = 0.0,
+    snap: float = 0.0,
     model: Predictor | str | PathLike[str] | None = None,
     heatmap: Heatmap | ArrayLike | None = None,
     simplify: bool = False,
@@ -62,7 +66,8 @@ def plan(
         grid: the map, or a file for :meth:`GridMap.load`.
         start: (x, y), world.
         goal: (x, y), world.
-        planner: OMPL's name of a geometric planner, such as ``"RRT"`` or ``"InformedRRTstar"``.
+        planner: a geometric planner by OMPL's name, such as ``"RRT"`` or ``"InformedRRTstar"``, or
+            as the literature writes it, ``"RRT*"``, ``"RRT-Connect"``...
         sampler: one of :data:`cbagan_ompl.planning.heatmap_sources.SAMPLERS`; ``"uniform"`` leaves
             OMPL's own sampler in place.
         time: limit of the planner's solve, seconds. RRT-like planners stop at their first
@@ -71,6 +76,8 @@ def plan(
         range: longest edge that the planner adds, world units; by default OMPL's choice (a
             fifth of the map's diagonal).
         radius: of the robot, world units; obstacles are inflated by it.
+        snap: how far a start or goal in an obstacle, in the margin around one, or in unknown space
+            is moved at most, to the nearest place where the robot may be, world units.
         model: for the learned sampler, a loaded model or the file of one; the bundled model by
             default.
         heatmap: to be sampled in place of the learned one: of this map, or an array (H, W) as
@@ -105,23 +112,27 @@ def plan(
         raise MapError(f"grid is a GridMap or the file of a map, got {show(grid)}")
     source = grid if isinstance(grid, GridMap) else GridMap.load(grid)
     space_map = source.inflated(radius)
+    moves: Moves = {}
+    if snap != 0:
+        distance = finite_number("snap", snap, 0.0)
+        (start, goal), moves = snap_endpoints(space_map, start, goal, distance)
     endpoints = space_map.check_task(start, goal)
     tolerance = space_map.resolution
     if goal_tolerance is not None:
         tolerance = finite_number("goal_tolerance", goal_tolerance, 0.0)
     options, seed = _with_seed(SamplerOptions.of(options, changes))
-    compat.planner_class(planner)
-    if sampler != UNIFORM:
-        hook_of(planner)
+    planner = planner_name(planner)
+    check_planner(planner, follows_heatmap=sampler != UNIFORM)
     name, make_heatmap = heatmap_source(sampler, model, heatmap)
     job = _Job(
         map_name=source.name,
         grid=space_map,
         endpoints=endpoints,
+        moves=moves,
         tolerance=tolerance,
         planner=planner,
         range=None if range is None else positive_number("range", range),
-        limits=_Limits.of(planner, time, iterations),
+        limits=Limits.of(planner, time, iterations),
         sampler=name,
         make_heatmap=make_heatmap,
         options=options,
@@ -134,62 +145,23 @@ def plan(
 
 
 @dataclass(frozen=True)
-class _Limits:
-    """When a planner is to stop.
-
-    Attributes:
-        time: seconds.
-        iterations: None where only the time counts.
-        can_watch: whether the planner takes a termination condition in Python.
-    """
-
-    time: float
-    iterations: int | None
-    can_watch: bool
-
-    @classmethod
-    def of(cls, planner: str, time: float, iterations: int | None) -> _Limits:
-        """Check the limits of a planner."""
-        seconds = positive_number("time", time)
-        count = None if iterations is None else whole_number("iterations", iterations, 1)
-        hangs = hangs_on_python_termination(planner)
-        if hangs and count is not None:
-            raise ConfigError(
-                f"{planner} of OMPL {compat.ompl_version()} cannot be limited by iterations, it "
-                "hangs on termination conditions in Python: limit its time instead"
-            )
-        return cls(seconds, count, not hangs)
-
-
-@dataclass(frozen=True)
 class _Job:
     """Everything that a plan needs, checked."""
 
     map_name: str
     grid: GridMap
     endpoints: Endpoints
+    moves: Moves
     tolerance: float
     planner: str
     range: float | None
-    limits: _Limits
+    limits: Limits
     sampler: str
     make_heatmap: HeatmapSource | None
     options: SamplerOptions
     seed: int
     simplify: bool
     keep_tree: bool
-
-
-@dataclass(frozen=True)
-class _Run:
-    """What a solve gave."""
-
-    is_exact: bool
-    status: str
-    planning_s: float
-    first_solution_s: float | None
-    progress: NDArray[np.float64]
-    iterations: int | None
 
 
 def _with_seed(options: SamplerOptions) -> tuple[SamplerOptions, int]:
@@ -211,7 +183,7 @@ def _run(job: _Job) -> PlanResult:
         attachment = attach(setup, heatmap, job.options)
     inference_s = perf_counter() - began if attachment else 0.0
     try:
-        run = _solve(setup, job)
+        run = solve(setup, job.planner, job.limits)
         simplify_s = _simplify(setup) if job.simplify and run.is_exact else 0.0
         return _result(job, setup, run, heatmap, attachment, inference_s, simplify_s)
     finally:
@@ -230,39 +202,8 @@ def _set_up(job: _Job) -> Any:
     return setup
 
 
-def _solve(setup: Any, job: _Job) -> _Run:
-    limits = job.limits
-    watch = _Watch(setup.getPlanner(), limits) if limits.can_watch else None
-    condition = compat.termination_condition(watch.stop) if watch else limits.time
-    began = perf_counter()
-    status = setup.solve(condition)
-    planning_s = perf_counter() - began
-    progress = np.array(watch.history.costs if watch else []).reshape(-1, 2)
-    first = planning_s if stops_at_first(job.planner) else None
-    return _Run(
-        is_exact=compat.is_exact(status),
-        status=str(status),
-        planning_s=planning_s,
-        first_solution_s=float(progress[0, 0]) if len(progress) else first,
-        progress=progress,
-        iterations=watch.iterations if watch else None,
-    )
-
-
-class _Watch:
-    """The termination condition: counts iterations, and notes each better solution."""
-
-    def __init__(self, planner: Any, limits: _Limits) -> None:
-        self.iterations = 0
-        self.history = CostHistory(planner)
-        self._most = inf if limits.iterations is None else limits.iterations
-        self._time = limits.time
-
-    def stop(self) -> bool:
-        if self.history.look() >= self._time or self.iterations >= self._most:
-            return True
-        self.iterations += 1
-        return False
+def _tree_of(setup: Any) -> NDArray[np.float64]:
+    return compat.tree_edges(compat.planner_data(setup.getPlanner()))
 
 
 def _simplify(setup: Any) -> float:
@@ -274,18 +215,19 @@ def _simplify(setup: Any) -> float:
 def _result(
     job: _Job,
     setup: Any,
-    run: _Run,
+    run: SolveRecord,
     heatmap: Heatmap | None,
     attachment: Attachment | None,
     inference_s: float,
     simplify_s: float,
 ) -> PlanResult:
-    path = None
+    checked = None
     if run.is_exact:
-        path = checked_path(setup, job.grid, job.endpoints, job.tolerance)
-    data = compat.planner_data(setup.getPlanner())
+        checked = checked_path(setup, job.grid, job.endpoints, job.tolerance)
+    is_solved = checked is not None
+    path = np.empty((0, 2)) if checked is None else checked
     return PlanResult(
-        solved=path is not None,
+        solved=is_solved,
         status=run.status,
         planner=job.planner,
         sampler=job.sampler,
@@ -295,18 +237,21 @@ def _result(
         map=job.map_name,
         start=job.endpoints[0],
         goal=job.endpoints[1],
+        snapped=job.moves,
         goal_tolerance=job.tolerance,
-        path=np.empty((0, 2)) if path is None else path,
-        cost=inf if path is None else path_length(path),
+        path=path,
+        trajectory=follow_path(path, job.grid.resolution / 2),
+        cost=path_length(path) if is_solved else inf,
         inference_s=inference_s,
         planning_s=run.planning_s,
         simplify_s=simplify_s,
         total_s=inference_s + run.planning_s + simplify_s,
-        first_solution_s=run.first_solution_s if path is not None else None,
+        first_solution_s=run.first_solution_s if is_solved else None,
         progress=run.progress,
         iterations=run.iterations,
-        nodes=int(data.numVertices()),
+        nodes=run.nodes,
+        nodes_at_first_solution=run.nodes_at_first_solution if is_solved else None,
         sample_counts=attachment.sample_counts if attachment else {"learned": 0, "uniform": 0},
         heatmap=heatmap,
-        tree=compat.tree_edges(data) if job.keep_tree else None,
+        tree=_tree_of(setup) if job.keep_tree else None,
     )

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
 from math import isfinite
+from os import PathLike
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.files import write_atomically
+from ..maps.endpoints import Moves
 from ..sampling.heatmap import Heatmap
+from .path_files import path_csv
 
 
 @dataclass(frozen=True)
@@ -26,10 +30,14 @@ class PlanResult:
         ompl_version: of the installed package.
         seed: what makes the samples of this run again.
         map: name of the map.
-        start: (x, y), world, as in :class:`cbagan_ompl.GridMap`.
+        start: (x, y), world, as in :class:`cbagan_ompl.GridMap`; where the path begins.
         goal: (x, y), world.
+        snapped: the endpoints that were moved, ``"start"`` or ``"goal"``, each with the point that
+            was ``"given"`` and the ``"distance"`` from it, world units; see ``snap``.
         goal_tolerance: how far from the goal a path may end, world units.
         path: way points from start to goal, (N, 2), world; empty when not solved.
+        trajectory: the path followed at steps of at most half a pixel, its way points included,
+            (M, 2), world; empty when not solved.
         cost: length of the path; infinite when not solved.
         inference_s: making the heat map and attaching it, loading the model not included.
         planning_s: inside the planner's ``solve``.
@@ -42,6 +50,8 @@ class PlanResult:
         iterations: evaluations of the termination condition, about one per iteration; None for
             planners that take no Python termination condition.
         nodes: states in the planner's tree or roadmap.
+        nodes_at_first_solution: the same when the first solution was found; None when not solved or
+            the planner does not let it be known.
         sample_counts: ``{"learned": n, "uniform": m}`` samples that the planner had from the heat
             map's hook; both 0 for the uniform sampler, which has no hook.
         heatmap: what was sampled; None for the uniform sampler. Not part of the JSON.
@@ -67,8 +77,10 @@ class PlanResult:
     map: str
     start: NDArray[np.float64]
     goal: NDArray[np.float64]
+    snapped: Moves
     goal_tolerance: float
     path: NDArray[np.float64]
+    trajectory: NDArray[np.float64]
     cost: float
     inference_s: float
     planning_s: float
@@ -78,9 +90,31 @@ class PlanResult:
     progress: NDArray[np.float64]
     iterations: int | None
     nodes: int
+    nodes_at_first_solution: int | None
     sample_counts: dict[str, int]
     heatmap: Heatmap | None = field(repr=False, metadata={"json": False})
     tree: NDArray[np.float64] | None = field(repr=False, metadata={"json": False})
+
+    def save_csv(self, path: str | PathLike[str]) -> None:
+        """Write the way points of the path as CSV, see :func:`.path_files.path_csv`.
+
+        Args:
+            path: of the file; one that is there is replaced.
+
+        Raises:
+            ConfigError: the file cannot be written.
+
+        Example:
+            >>> from pathlib import Path
+            >>> from tempfile import TemporaryDirectory
+            >>> from cbagan_ompl import plan
+            >>> result = plan("bundled:maze", (10, 10), (245, 245), sampler="corridor", seed=1)
+            >>> with TemporaryDirectory() as folder:
+            ...     result.save_csv(Path(folder) / "path.csv")
+            ...     Path(folder, "path.csv").read_text().splitlines()[:2]
+            ['x,y,index', '10.0,10.0,0']
+        """
+        write_atomically(path, path_csv(self.path))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as JSON-ready values; an infinite cost becomes None."""

@@ -138,3 +138,25 @@ def checked_path(
 def path_length(path: NDArray[np.float64]) -> float:
     """Return the length of a path, (N, 2), world units."""
     return float(np.hypot(*np.diff(path, axis=0).T).sum())
+
+
+def follow_path(path: NDArray[np.float64], step: float) -> NDArray[np.float64]:
+    """Return points along a path, the way points among them.
+
+    Args:
+        path: way points, (N, 2), world.
+        step: the longest distance between two points, world units.
+
+    Returns:
+        (M, 2), world; each segment is divided into equal steps.
+
+    Example:
+        >>> follow_path(np.array([[0.0, 0.0], [0.0, 1.0]]), 0.5).tolist()
+        [[0.0, 0.0], [0.0, 0.5], [0.0, 1.0]]
+    """
+    counts = np.ceil(np.hypot(*np.diff(path, axis=0).T) / step).astype(int).clip(1)
+    pieces = [
+        np.linspace(start, end, count, endpoint=False)
+        for start, end, count in zip(path[:-1], path[1:], counts.tolist(), strict=True)
+    ]
+    return np.vstack((*pieces, path[-1:]))

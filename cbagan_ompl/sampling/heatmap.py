@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from os import PathLike
 from pathlib import Path
 from typing import Any, SupportsIndex
@@ -12,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..common.validation import random_generator, whole_number
 from ..errors import HeatmapError, show
-from ..maps.connectivity import in_one_component, label_components
+from ..maps.connectivity import in_one_component
 from ..maps.endpoints import check_point
 from ..maps.grid_map import GridMap
 from ..maps.grid_search import pull_taut, shortest_path
@@ -183,11 +182,6 @@ class Heatmap:
         """The promising region: values from :data:`REGION_THRESHOLD` on, shape (H, W)."""
         return self.values >= REGION_THRESHOLD
 
-    @cached_property
-    def components(self) -> NDArray[np.int32]:
-        """The 4-connected parts of the region, numbered from 1; 0 outside of it, shape (H, W)."""
-        return label_components(self.region, connectivity=4)
-
     def connects(self, start: ArrayLike, goal: ArrayLike) -> bool:
         """Return whether the region holds both points and a 4-connected path between them.
 
@@ -206,7 +200,8 @@ class Heatmap:
         endpoints = np.array((check_point("start", start), check_point("goal", goal)))
         if not self.grid.is_free(endpoints).all():
             return False
-        return in_one_component(self.components, *pixel_pair(self.grid.to_pixel(endpoints)))
+        pixels = pixel_pair(self.grid.to_pixel(endpoints))
+        return in_one_component(self.region, *pixels, connectivity=4)
 
     def connected(self, start: ArrayLike, goal: ArrayLike) -> Heatmap:
         """Return this heat map with a region that connects start and goal.

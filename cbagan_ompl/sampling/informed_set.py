@@ -48,10 +48,21 @@ class InformedSet:
             - self.tolerance
         )
 
-    def pixel_cost_bounds(self, grid: GridMap) -> NDArray[np.float64]:
-        """Return a lower bound on the length of a path through any point of each pixel, (H, W)."""
-        through_centres = _nearest_pixel_distances(grid, self.starts) + _nearest_pixel_distances(
-            grid, self.goals
+    def pixel_cost_bounds(self, grid: GridMap, pixels: NDArray[np.intp]) -> NDArray[np.float64]:
+        """Return a lower bound on the length of a path through any point of some pixels.
+
+        Args:
+            grid: the map.
+            pixels: flat row-major indices, (K,).
+
+        Returns:
+            (K,), world units.
+        """
+        rows, columns = np.divmod(pixels, grid.width)
+        centres = np.stack((columns + 0.5, rows + 0.5), axis=-1)
+        through_centres = grid.resolution * (
+            _nearest_distances(centres, grid.to_pixel(self.starts))
+            + _nearest_distances(centres, grid.to_pixel(self.goals))
         )
         # The bound changes at most twice as fast as the distance from the centre, half a diagonal.
         return np.asarray(through_centres - (self.tolerance + np.sqrt(2) * grid.resolution))
@@ -62,10 +73,3 @@ def _nearest_distances(
 ) -> NDArray[np.float64]:
     distances = [np.hypot(points[:, 0] - x, points[:, 1] - y) for x, y in endpoints.tolist()]
     return np.asarray(np.minimum.reduce(distances))
-
-
-def _nearest_pixel_distances(grid: GridMap, endpoints: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the distance of each pixel's centre from the nearest endpoint, (H, W), world units."""
-    columns, rows = np.arange(grid.width) + 0.5, np.arange(grid.height)[:, None] + 0.5
-    squares = [(columns - u) ** 2 + (rows - v) ** 2 for u, v in grid.to_pixel(endpoints).tolist()]
-    return np.asarray(grid.resolution * np.sqrt(np.minimum.reduce(squares)))

@@ -15,9 +15,10 @@ from .pixels import sample_in_pixels, sample_pixels
 # The first batch is small, because small tasks need few samples; each is twice the one before.
 _FIRST_BATCH, _LARGEST_BATCH = 128, 1024
 
-# Fraction of a batch inside the informed set under which only pixels inside the set are weighted:
-# while most samples fall inside, rejecting the others is cheaper than weighting all pixels anew.
-_MIN_ACCEPTED = 0.5
+# Pixels that are weighted anew in the time that it takes to reject as many samples as a batch has.
+# While enough samples fall inside the informed set, rejecting the others is cheaper than weighting
+# only the pixels inside.
+_PIXELS_PER_BATCH = 30_000
 
 # Samples in a row that may be rejected because the tree covers them already.
 _MAX_REJECTED = 20
@@ -122,7 +123,7 @@ class PixelSampler:
 
     def _refill(self, best: float) -> None:
         size, self._batch = self._batch, min(2 * self._batch, _LARGEST_BATCH)
-        if self._accepted < _MIN_ACCEPTED:
+        if self._accepted * (1 + len(self._support) / _PIXELS_PER_BATCH) < 1:
             self._weight_pixels(best)
         pixels = sample_pixels(self._active, self._cumulative, size, self._rng)
         points = sample_in_pixels(self._grid, pixels, self._rng)
@@ -140,8 +141,7 @@ class PixelSampler:
         self._active, weights = self._support, self._weights
         if self._informed is not None:
             if self._bounds is None:
-                bounds = self._informed.pixel_cost_bounds(self._grid)
-                self._bounds = bounds.ravel()[self._support]
+                self._bounds = self._informed.pixel_cost_bounds(self._grid, self._support)
             inside = np.asarray(self._bounds <= best)
             if inside.any():
                 self._active = self._support[inside]

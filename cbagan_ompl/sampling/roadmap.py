@@ -8,9 +8,9 @@ From then on the budget alone grants learned samples, which go once over the hea
 
 from __future__ import annotations
 
-from .adaptation import TreeCoverage
 from .budget import LearnedBudget
 from .heatmap import Heatmap
+from .tree_coverage import TreeCoverage
 
 
 class RoadmapMixture:

@@ -68,6 +68,60 @@ def test_negative_coordinates(tmp_path: Path) -> None:
     assert json.loads(report.read_text())["start"] == [-2.5, -1.5]
 
 
+def test_snap_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    report = tmp_path / "plan.json"
+    grid = GridMap.load(MAP)
+    task = tasks_of(MAP, grid)[0]
+    row, column = np.argwhere(~grid.free)[100]
+    words = [*QUICK, "--start", f"{column}.5,{row}.5", "--goal", "{},{}".format(*task.goal)]
+    assert main(words) == 2
+    assert "is in an obstacle" in capsys.readouterr().err
+    assert main([*words, "--snap", "30", "--json", str(report)]) == 0
+    values = json.loads(report.read_text())
+    move = values["snapped"]["start"]
+    assert move["given"] == [column + 0.5, row + 0.5]
+    line = f"start moved    by {move['distance']:.4g}, from {column}.5,{row}.5 to "
+    assert line in capsys.readouterr().out
+    assert grid.is_free(values["start"])
+
+
+@pytest.mark.parametrize(
+    ("sampler", "kind"),
+    [("corridor", " from the corridor, "), ("straight-line", " from the straight line, ")],
+)
+def test_samples_are_called_by_where_they_are_from(
+    sampler: str, kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    report = tmp_path / "plan.json"
+    words = ["plan", MAP, "--sampler", sampler, "--planner", "RRT", "--range", "20"]
+    main([*words, "--json", str(report)])
+    printed = capsys.readouterr().out
+    assert kind in printed
+    assert "learned" not in printed
+    assert json.loads(report.read_text())["sample_counts"].keys() == {"learned", "uniform"}
+
+
+def test_uniform_has_samples_of_ompl(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["plan", MAP, "--sampler", "uniform", "--planner", "RRT", "--range", "20"])
+    printed = capsys.readouterr().out
+    assert "samples        OMPL's own" in printed
+    assert "learned" not in printed
+
+
+def test_csv(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table, report = tmp_path / "path.csv", tmp_path / "plan.json"
+    assert main([*QUICK, "--csv", str(table), "--json", str(report)]) == 0
+    lines = table.read_text().splitlines()
+    assert lines[0] == "x,y,index"
+    path = json.loads(report.read_text())["path"]
+    assert [[float(x) for x in line.split(",")[:2]] for line in lines[1:]] == path
+    assert main([*QUICK, "--csv", str(table)]) == 0, "ours"
+    table.write_text("time,voltage\n0,1\n")
+    assert main([*QUICK, "--csv", str(table)]) == 2
+    assert "say --force" in capsys.readouterr().err
+    assert main([*QUICK, "--csv", "missing/path.csv"]) == 2
+
+
 def test_heatmap_file(tmp_path: Path) -> None:
     grid = GridMap.load(MAP)
     task = tasks_of(MAP, grid)[0]

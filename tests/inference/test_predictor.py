@@ -10,7 +10,7 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from cbagan_ompl import GridMap, Heatmap, MissingDependencyError, TaskError
-from cbagan_ompl.inference.predictor import Predictor, load_model, scaled_free, scaled_shape
+from cbagan_ompl.inference.predictor import Predictor, load_model
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,6 @@ def test_any_size(predictor: Predictor, shape: tuple[int, int]) -> None:
     heatmap = predictor.predict(grid, *endpoints, repair=False)
     assert isinstance(heatmap, Heatmap)
     assert heatmap.values.shape == shape
-    assert (heatmap.values[free] > 0).all()
     assert (heatmap.values[~free] == 0).all()
     assert predictor.predict(grid, *endpoints).connects(*endpoints)
 
@@ -38,6 +37,41 @@ def test_predictions_repeat_and_leave_the_threads_alone(predictor: Predictor) ->
     first, second = (predictor.predict(grid, (1, 1), (30, 30)).values for _ in range(2))
     assert np.array_equal(first, second)
     assert torch.get_num_threads() == threads
+
+
+STATES = {
+    "default dtype": "torch.set_default_dtype(torch.float64)",
+    "default device": "torch.set_default_device('meta')",
+    "deterministic": "torch.use_deterministic_algorithms(True)",
+    "inference mode": "mode.__enter__()",
+    "autocast": "cast.__enter__()",
+    "threads": "torch.set_num_threads(3)",
+}
+
+
+def test_the_callers_torch_settings_do_not_matter(exported: Path) -> None:
+    """In another process, and one after the other, since few of the settings can be taken back."""
+    code = f"""
+import sys, numpy, torch
+from cbagan_ompl import GridMap, load_model
+grid = GridMap(numpy.ones((32, 32)))
+predict = lambda model: model.predict(grid, (1, 1), (30, 30), repair=False).values
+mode, cast = torch.inference_mode(), torch.autocast("cpu", torch.bfloat16)
+before = load_model(sys.argv[1])
+values = predict(before)
+for name, change in {STATES!r}.items():
+    exec(change)
+    for model in (before, load_model(sys.argv[1])):
+        assert numpy.array_equal(predict(model), values), name
+assert torch.get_default_dtype() == torch.float64
+assert torch.is_autocast_enabled("cpu")
+assert torch.is_inference_mode_enabled()
+assert str(torch.empty(1).device) == "meta"
+assert torch.get_num_threads() == 3
+"""
+    command = [sys.executable, "-W", "ignore", "-c", code, str(exported)]
+    result = subprocess.run(command, check=False, capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
 
 
 def test_coordinates_of_the_network_are_pixels_of_the_scaled_map() -> None:
@@ -64,30 +98,38 @@ def test_a_heat_map_without_region_can_be_sampled() -> None:
     assert not heatmap.region.any()
 
 
+def test_many_tasks_have_the_heat_maps_of_each(predictor: Predictor) -> None:
+    free = np.ones((40, 64), bool)
+    free[:30, 30] = False
+    grid = GridMap(free)
+    rng = np.random.default_rng(0)
+    starts, goals = rng.uniform((0, 0), (30, 40), (19, 2)), rng.uniform((31, 0), (64, 40), (19, 2))
+    together = predictor.predict_many(grid, starts, goals)
+    for heatmap, start, goal in zip(together, starts, goals, strict=True):
+        alone = predictor.predict(grid, start, goal)
+        np.testing.assert_allclose(heatmap.values, alone.values, atol=1e-4)
+    assert predictor.predict_many(grid, [], []) == []
+
+
+@pytest.mark.parametrize(
+    ("starts", "goals", "message"),
+    [
+        ([(1, 1)], [], "1 and 0"),
+        (3, [(1, 1)], "starts is a list of points"),
+        ([(1, 1)], [(50, 50)], "outside"),
+        ([(1, 1, 1)], [(5, 5)], "two finite numbers"),
+    ],
+)
+def test_tasks_that_cannot_be_predicted(
+    predictor: Predictor, starts: object, goals: object, message: str
+) -> None:
+    with pytest.raises(TaskError, match=message):
+        predictor.predict_many(GridMap(np.ones((20, 20))), starts, goals)  # type: ignore[arg-type]
+
+
 def test_tasks_outside_the_map(predictor: Predictor) -> None:
     with pytest.raises(TaskError):
         predictor.predict(GridMap(np.ones((20, 20))), (1, 1), (50, 50))
-
-
-def test_scaled_shape_keeps_the_aspect() -> None:
-    assert scaled_shape((256, 128), 64) == (64, 32)
-    assert scaled_shape((30, 40), 64) == (48, 64)
-    assert scaled_shape((64, 20), 64) == (64, 20)
-    assert scaled_shape((1000, 3), 64) == (64, 1)
-    assert scaled_shape((20, 10), 64) == (40, 20), "doubled at most"
-
-
-def test_scaling_keeps_narrow_passages() -> None:
-    free = np.zeros((10, 7), bool)
-    free[:, 3] = True
-    assert scaled_free(free, (4, 3)).tolist() == [[False, True, False]] * 4
-    assert np.array_equal(scaled_free(free, free.shape), free)
-
-
-def test_small_maps_are_enlarged() -> None:
-    free = np.array([[True, False], [False, True]])
-    enlarged = scaled_free(free, (4, 6))
-    assert np.array_equal(enlarged, free.repeat(2, axis=0).repeat(3, axis=1))
 
 
 def test_the_package_does_not_import_torch() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from cbagan_ompl import ConfigError, GridMap, TaskError
+from cbagan_ompl.maps.endpoints import snap_endpoints
 
 
 @pytest.fixture
@@ -93,3 +94,39 @@ def test_inflated_maps_are_kept(grid: GridMap) -> None:
 def test_one_point_is_answered_with_a_bool(grid: GridMap) -> None:
     assert type(grid.is_free((5, 5))) is bool
     assert grid.is_free([(5, 5), (14.5, 5)]).tolist() == [True, False]
+
+
+def test_snapped_endpoints_are_connected_where_that_can_be() -> None:
+    """A start in a thin wall goes to the side of the goal, though the other one is nearer."""
+    free = np.ones((20, 30), bool)
+    free[:, 14:17] = False
+    grid = GridMap(free)
+    (start, goal), moves = snap_endpoints(grid, (14.2, 5.5), (25, 5), 4)
+    np.testing.assert_allclose(start, (17, 5.5), atol=2e-3)
+    np.testing.assert_array_equal(goal, (25, 5))
+    assert moves.keys() == {"start"}
+    assert moves["start"]["given"] == [14.2, 5.5]
+    assert moves["start"]["distance"] == pytest.approx(2.8, abs=2e-3)
+    # Nearest of all where the side of the goal is out of reach: the check of the task says why.
+    (start, goal), _ = snap_endpoints(grid, (14.2, 5.5), (25, 5), 1)
+    np.testing.assert_allclose(start, (14, 5.5), atol=2e-3)
+    with pytest.raises(TaskError, match="no path connects"):
+        grid.check_task(start, goal)
+
+
+def test_both_endpoints_in_a_wall_go_to_one_side() -> None:
+    free = np.ones((20, 30), bool)
+    free[:, 10:20] = False
+    (start, goal), moves = snap_endpoints(GridMap(free), (12, 5), (17, 15), 8)
+    np.testing.assert_allclose((start[0], goal[0]), (10, 10), atol=2e-3)
+    assert moves.keys() == {"start", "goal"}
+
+
+def test_a_free_endpoint_is_never_moved() -> None:
+    """Not even out of a closed room: the robot is in there."""
+    free = np.ones((20, 30), bool)
+    free[:, 14] = False
+    grid = GridMap(free)
+    (start, _), moves = snap_endpoints(grid, (13.5, 5), (25, 5), 10)
+    np.testing.assert_array_equal(start, (13.5, 5))
+    assert moves == {}

@@ -262,16 +262,6 @@ def test_shape_and_repr():
     assert "image frame" in repr(GridMap([[1]]))
 
 
-def test_clearance_is_the_distance_to_the_nearest_obstacle() -> None:
-    free = np.random.default_rng(0).random((30, 40)) > 0.02
-    clearance = GridMap(free).clearance
-    blocked = np.argwhere(~free)
-    pixels = np.argwhere(free)
-    exact = np.sqrt(((pixels[:, None] - blocked) ** 2).sum(2)).min(1)
-    np.testing.assert_allclose(clearance[free], exact, rtol=0.02)
-    assert (clearance[~free] == 0).all()
-
-
 @given(
     st.integers(1, 40),
     st.floats(0.01, 10),

@@ -1,8 +1,10 @@
 from __future__ import annotations
 
+import csv
 import gc
 import json
 import resource
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,6 +27,7 @@ from cbagan_ompl import (
 )
 from cbagan_ompl.planning import compat
 from cbagan_ompl.planning.hooks import hangs_on_python_termination
+from cbagan_ompl.planning.path_files import path_csv
 
 
 def check(result: PlanResult, grid: GridMap) -> None:
@@ -34,6 +37,13 @@ def check(result: PlanResult, grid: GridMap) -> None:
     assert np.hypot(*(result.path[-1] - result.goal)) <= result.goal_tolerance + 1e-9
     assert np.isclose(result.cost, np.hypot(*np.diff(result.path, axis=0).T).sum())
     assert result.nodes >= len(result.path)
+    if result.nodes_at_first_solution is not None:
+        assert 2 <= result.nodes_at_first_solution <= result.nodes
+    steps = np.hypot(*np.diff(result.trajectory, axis=0).T)
+    assert steps.max() <= grid.resolution / 2 * (1 + 1e-9)
+    assert np.isclose(steps.sum(), result.cost)
+    assert grid.is_free(result.trajectory).all()
+    assert {*map(tuple, result.path)} <= {*map(tuple, result.trajectory)}
     assert result.total_s == result.inference_s + result.planning_s + result.simplify_s
 
 
@@ -49,6 +59,9 @@ def test_samplers_and_planners(two_walls: GridMap, planner: str, sampler: str) -
     assert result.first_solution_s is not None
     assert 0 < result.first_solution_s <= result.planning_s
     assert (len(result.progress) > 0) == ("RRTstar" in planner)
+    assert result.nodes_at_first_solution is not None
+    if "star" not in planner:
+        assert result.nodes_at_first_solution == result.nodes
     if len(result.progress):
         assert result.progress[0, 0] == result.first_solution_s
         assert (np.diff(result.progress[:, 1]) < 0).all()
@@ -160,6 +173,24 @@ def test_path_to_the_goal_itself(two_walls: GridMap, planner: str, sampler: str)
     np.testing.assert_array_equal(result.path[-1], GOAL)
 
 
+def test_nodes_at_the_first_solution_are_those_of_a_run_that_ends_there(
+    two_walls: GridMap,
+) -> None:
+    limits = {"time": 60, "range": 20, "seed": 4}
+    whole = plan(two_walls, START, GOAL, "RRTstar", "corridor", iterations=3000, **limits)
+    first = whole.nodes_at_first_solution
+    assert first is not None
+    assert first < whole.nodes
+    # An iteration adds a node or none: the shortest run that has a solution has as many.
+    low, high = 1, 3000
+    while low < high:
+        middle = (low + high) // 2
+        run = plan(two_walls, START, GOAL, "RRTstar", "corridor", iterations=middle, **limits)
+        low, high = (low, middle) if run.solved else (middle + 1, high)
+    run = plan(two_walls, START, GOAL, "RRTstar", "corridor", iterations=low, **limits)
+    assert run.nodes == run.nodes_at_first_solution == first
+
+
 def test_own_heatmap(two_walls: GridMap, corridor: Heatmap) -> None:
     result = plan(two_walls, START, GOAL, "RRT", time=5, range=20, heatmap=corridor, seed=0)
     check(result, two_walls)
@@ -167,12 +198,46 @@ def test_own_heatmap(two_walls: GridMap, corridor: Heatmap) -> None:
     assert result.sample_counts["learned"] > result.sample_counts["uniform"]
 
 
+def test_snap_moves_endpoints_out_of_the_margin(two_walls: GridMap) -> None:
+    start, options = (100.0, 58.0), {"time": 5, "radius": 6, "range": 20, "seed": 0}
+    with pytest.raises(TaskError, match="too close to an obstacle of two_walls for the robot's"):
+        plan(two_walls, start, GOAL, "RRT", "corridor", **options)
+    result = plan(two_walls, start, GOAL, "RRT", "corridor", snap=9, **options)
+    check(result, two_walls.inflated(6))
+    move = result.snapped["start"]
+    assert move["given"] == [100, 58]
+    assert move["distance"] == np.hypot(*(result.start - start)) < 9
+    assert result.snapped.keys() == {"start"}
+    assert json.loads(json.dumps(result.to_dict()))["snapped"]["start"] == move
+    with pytest.raises(TaskError, match=r"nothing within 1 of it is free"):
+        plan(two_walls, start, GOAL, "RRT", "corridor", snap=1, **options)
+    free = plan(two_walls, START, GOAL, "RRT", "corridor", snap=9, **options)
+    assert free.snapped == {}
+    np.testing.assert_array_equal(free.start, START)
+
+
+def test_paths_are_written_as_tables(two_walls: GridMap, tmp_path: Path) -> None:
+    result = plan(two_walls, START, GOAL, "RRT", "corridor", time=5, range=20, seed=0)
+    result.save_csv(tmp_path / "path.csv")
+    with open(tmp_path / "path.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]) == ["x", "y", "index"]
+    assert [int(row["index"]) for row in rows] == list(range(len(result.path)))
+    table = np.array([(row["x"], row["y"]) for row in rows], float)
+    np.testing.assert_array_equal(table, result.path)
+    with pytest.raises(ConfigError, match="cannot write"):
+        result.save_csv(tmp_path / "missing" / "path.csv")
+    assert path_csv(np.array([[1, 2, 0.5]])) == "x,y,yaw,index\n1.0,2.0,0.5,0\n"
+    assert path_csv(np.empty((0, 2))) == "x,y,index\n"
+
+
 def test_unsolved_is_said(two_walls: GridMap) -> None:
     result = plan(
         two_walls, START, GOAL, "RRTstar", "uniform", time=5, iterations=20, range=5, seed=0
     )
     assert not result.solved
-    assert result.path.shape == (0, 2)
+    assert result.path.shape == result.trajectory.shape == (0, 2)
+    assert result.nodes_at_first_solution is None
     assert result.first_solution_s is None
     values = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     assert values["cost"] is None
@@ -188,6 +253,7 @@ def test_json_fields(two_walls: GridMap) -> None:
     assert set(values) >= {
         "solved", "planner", "sampler", "hook", "ompl_version", "seed", "path", "cost",
         "inference_s", "planning_s", "total_s", "nodes", "sample_counts", "first_solution_s",
+        "trajectory", "nodes_at_first_solution",
     }  # fmt: skip
     assert not {"tree", "heatmap"} & set(values)
     assert set(values["sample_counts"]) == {"learned", "uniform"}
@@ -216,6 +282,9 @@ BAD = [
     ({"radius": 500}, MapError, "fits nowhere"),
     ({"seed": -1}, ConfigError, "seed"),
     ({"uniform_fraction": 0, "sampler": "corridor"}, ConfigError, "uniform_fraction"),
+    ({"snap": -1}, ConfigError, "snap"),
+    ({"snap": "far"}, ConfigError, "snap"),
+    ({"snap": None}, ConfigError, "snap"),
     ({"goal_tolerance": -1}, ConfigError, "goal_tolerance"),
     ({"seed": 1.5}, ConfigError, "seed is a whole number"),
     ({"time": "1"}, ConfigError, "time"),

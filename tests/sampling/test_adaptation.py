@@ -10,9 +10,10 @@ from helpers.monitors import FakeMonitor
 from helpers.tasks import GOAL, START
 
 from cbagan_ompl import ConfigError, GridMap, Heatmap, plan
-from cbagan_ompl.sampling.adaptation import AdaptiveMixture, TreeCoverage
+from cbagan_ompl.sampling.adaptation import AdaptiveMixture
 from cbagan_ompl.sampling.options import FULL_ADAPTATION, NO_ADAPTATION, Adaptation
 from cbagan_ompl.sampling.sampler import HeatmapSampler
+from cbagan_ompl.sampling.tree_coverage import TreeCoverage
 
 
 def make_mixture(

@@ -58,8 +58,7 @@ def test_no_point_of_a_pixel_is_below_the_bound_of_the_pixel() -> None:
     grid = GridMap(np.ones((12, 20), np.bool_), resolution=0.5, origin=(3.0, -1.0, 0.6))
     corners = grid.to_world([(4.2, 3.1), (15.0, 8.5), (18.7, 2.0)])
     informed = InformedSet(corners[:1], corners[1:], tolerance=0.25)
-    bounds = informed.pixel_cost_bounds(grid)
-    assert bounds.shape == grid.shape
+    bounds = informed.pixel_cost_bounds(grid, np.arange(grid.free.size)).reshape(grid.shape)
     pixels = np.random.default_rng(0).random((5000, 2)) * (grid.width, grid.height)
     columns, rows = pixels.astype(int).T
     above = informed.cost_bounds(grid.to_world(pixels)) - bounds[rows, columns]

@@ -88,7 +88,8 @@ def test_no_point_of_a_pixel_is_below_the_bound_of_the_pixel(
     column, row = np.minimum(point, (grid.width - 1, grid.height - 1)).astype(int)
     (bound,) = informed.cost_bounds(grid.to_world([point])).tolist()
     slack = 1e-6 * (1 + abs(bound))
-    assert informed.pixel_cost_bounds(grid)[row, column] <= bound + slack
+    (of_pixel,) = informed.pixel_cost_bounds(grid, np.array([row * grid.width + column])).tolist()
+    assert of_pixel <= bound + slack
 
 
 @given(heatmaps(), st.integers(0, 2**32))
@@ -98,9 +99,8 @@ def test_informed_samples_can_lie_on_a_shorter_path(heatmap: Heatmap, seed: int)
     informed = InformedSet(low[None], high[None], 0.0)
     cost = 1.2 * float(np.hypot(*(high - low)))
     # Only where the set holds whole pixels, or a sample from outside may have to be handed out.
-    if not (
-        informed.pixel_cost_bounds(grid)[heatmap.values > 0] + 4 * grid.resolution < cost
-    ).any():
+    bounds = informed.pixel_cost_bounds(grid, heatmap.support)
+    if not (bounds + 4 * grid.resolution < cost).any():
         return
     monitor = FakeMonitor(lambda: cost, informed)
     sampler = HeatmapSampler(heatmap, monitor=monitor, seed=seed)

@@ -1,0 +1,1 @@
+"""Robots: their shapes, and exact checks of shapes against the grid. Knows nothing of OMPL."""
