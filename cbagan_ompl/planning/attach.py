@@ -16,7 +16,7 @@ from ..sampling.options import OPTIMIZING_SHARPNESS, SamplerOptions
 from ..sampling.roadmap import RoadmapMixture
 from ..sampling.sampler import HeatmapSampler
 from . import compat, ompl_samplers
-from .bounds_steering import SteeringMonitor, install_steering
+from .bounds_steering import SteeringMonitor
 from .compat import ob, og, ou
 from .goal_injection import InjectedGoal
 from .goal_monitor import GoalMonitor, goal_monitor
@@ -34,6 +34,7 @@ from .hooks import (
 )
 from .monitor import PlannerMonitor, is_informed, is_monitored, release_forgotten
 from .states import StateAccess, position_bounds, state_access
+from .steered_callbacks import install_steering
 
 # OMPL's range of a planner that was given none, as a fraction of the extent of the space.
 _OMPL_RANGE = 0.2
