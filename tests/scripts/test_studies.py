@@ -57,3 +57,23 @@ def test_paper_tables(folder: Path, tmp_path: Path) -> None:
         assert samplers["uniform"]["nodes_ratio"] == [1, 1, 1]
         assert samplers["bundled"]["nodes"][0] > 1
         assert samplers["bundled"]["inference_ms"][0] > 0
+
+
+def test_rrtconnect(tmp_path: Path) -> None:
+    pytest.importorskip("torch")
+    report = tmp_path / "rrtconnect.json"
+    words = ["--synthetic", "2", "--runs", "2", "--json", str(report)]
+    printed = run_script(STUDIES / "rrtconnect.py", *words)
+    assert "range 20 px" in printed
+    rows = json.loads(report.read_text())["ranges"]["20 px"]
+    assert rows["uniform"]["planning_ratio"] == rows["uniform"]["iterations_ratio"] == 1
+    assert rows["learned"]["our_samples"] > 0
+
+
+def test_wrong_heatmaps(tmp_path: Path) -> None:
+    report = tmp_path / "wrong.json"
+    words = ["--planners", "RRT,RRTstar", "--runs", "2", "--json", str(report)]
+    run_script(STUDIES / "wrong_heatmaps.py", *words)
+    planners = json.loads(report.read_text())["planners"]
+    assert set(planners) == {"RRT", "RRTstar"}
+    assert all(row["solved"] == 1 for rows in planners.values() for row in rows.values())
