@@ -138,7 +138,8 @@ def attach(
 
     Args:
         setup: an ``ompl.geometric.SimpleSetup``.
-        heatmap: what to sample, in the coordinates of the setup's space.
+        heatmap: what to sample, in the coordinates of the setup's space. Where states have a yaw
+            and the heat map no headings, those of :meth:`.Heatmap.directed` to the goal are taken.
         options: how samples follow the heat map. ``sharpness`` None stands for 1 with planners that
             stop at their first path, and for
             :data:`cbagan_ompl.sampling.options.OPTIMIZING_SHARPNESS` with those that go on.
