@@ -149,7 +149,8 @@ def attach(
         setup: an ``ompl.geometric.SimpleSetup``, or a geometric planner with its problem
             definition, where there is no setup. The solves of such a planner are not watched on
             OMPL 2.0: a goal that is replaced while it is attached is not noticed there.
-        heatmap: what to sample, in the coordinates of the setup's space.
+        heatmap: what to sample, in the coordinates of the setup's space. Where states have a yaw
+            and the heat map no headings, those of :meth:`.Heatmap.directed` to the goal are taken.
         options: how samples follow the heat map. ``sharpness`` None stands for 1 with planners that
             stop at their first path other than RRTConnect, and for
             :data:`cbagan_ompl.sampling.options.OPTIMIZING_SHARPNESS` with those that go on.
