@@ -10,28 +10,35 @@ from typing import Any
 
 from ..errors import PlannerError
 from ..sampling.adaptation import AdaptiveMixture
+from ..sampling.budget import EARNED_BY_UNIFORM_UNSEEN, LearnedBudget
 from ..sampling.checks import check_heatmap
 from ..sampling.headings import HeadingSampler
 from ..sampling.heatmap import Heatmap
 from ..sampling.options import OPTIMIZING_SHARPNESS, SamplerOptions
+from ..sampling.roadmap import RoadmapMixture
 from ..sampling.sampler import HeatmapSampler
 from . import compat, ompl_samplers
 from .attachable import check_task, planner_of, setup_of
+from .bounds_steering import SteeringMonitor
 from .compat import ou
 from .goal_injection import InjectedGoal
 from .goal_monitor import GoalMonitor, goal_monitor
 from .hooks import (
+    BOUNDS_STEERING,
     GOAL_INJECTION,
     STATE_SAMPLER,
     VALID_STATE_SAMPLER,
     class_name,
     hook_of,
     keeps_sampler,
+    samples_are_nodes,
     stops_at_first,
+    wants_sharp,
 )
 from .monitor import PlannerMonitor, is_informed, release_forgotten
 from .pose_headings import with_headings
 from .states import StateAccess, drives_backwards, position_bounds, state_access
+from .steered_callbacks import install_steering
 
 # OMPL's range of a planner that was given none, as a fraction of the extent of the space.
 _OMPL_RANGE = 0.2
@@ -144,7 +151,7 @@ def attach(
             OMPL 2.0: a goal that is replaced while it is attached is not noticed there.
         heatmap: what to sample, in the coordinates of the setup's space.
         options: how samples follow the heat map. ``sharpness`` None stands for 1 with planners that
-            stop at their first path, and for
+            stop at their first path other than RRTConnect, and for
             :data:`cbagan_ompl.sampling.options.OPTIMIZING_SHARPNESS` with those that go on.
             ``adaptation`` is for planners that goal injection reaches. ``seed`` is that of our
             samples alone; seed OMPL as well for plans that can be repeated.
@@ -185,7 +192,7 @@ def attach(
     name = class_name(planner)
     hook = hook_of(name)
     if options.sharpness is None:
-        sharpness = 1.0 if stops_at_first(name) else OPTIMIZING_SHARPNESS
+        sharpness = OPTIMIZING_SHARPNESS if wants_sharp(name) else 1.0
         options = replace(options, sharpness=sharpness)
     rng = options.generator()
     space = setup.getStateSpace()
@@ -194,12 +201,15 @@ def attach(
     heatmap = with_headings(setup, heatmap, options.heading)
     headings = HeadingSampler(heatmap, options.heading, rng, drives_backwards(space))
     states = state_access(space, headings)
-    injects = hook == GOAL_INJECTION
-    monitor = (goal_monitor if injects else PlannerMonitor)(setup, states)
-    mixture = None
-    if injects:
-        mixture = AdaptiveMixture(heatmap, options.adaptation, _reach_of(planner), monitor)
-    sampler = HeatmapSampler(heatmap, replace(options, seed=rng), monitor, mixture)
+    monitor = _MONITORS.get(hook, PlannerMonitor)(setup, states)
+    budget = _budget_of(planner, name) if options.adaptation.stagnation else None
+    mixture: AdaptiveMixture | RoadmapMixture | None = None
+    if hook in _MONITORS:  # callbacks see the tree
+        reach = _reach_of(planner)
+        mixture = AdaptiveMixture(heatmap, options.adaptation, reach, monitor, budget)
+    elif samples_are_nodes(name) and options.adaptation.coverage:
+        mixture = RoadmapMixture(heatmap, _reach_of(planner), budget)
+    sampler = HeatmapSampler(heatmap, replace(options, seed=rng), monitor, mixture, budget)
     sampler.keep_inside(*position_bounds(space))
     # Samplers and solutions that are there already would keep the planner from asking for samples.
     planner.clear()
@@ -223,7 +233,14 @@ def _reach_of(planner: Any) -> float:
     """Return how far around a node a tree need not grow again, world units: most of its range."""
     # Before its setup a planner may have no range yet; OMPL then takes a fraction of the space.
     si = planner.getSpaceInformation()
-    return _REACH * float(planner.getRange() or _OMPL_RANGE * si.getMaximumExtent())
+    range = planner.getRange() if hasattr(planner, "getRange") else 0.0
+    return _REACH * float(range or _OMPL_RANGE * si.getMaximumExtent())
+
+
+def _budget_of(planner: Any, name: str) -> LearnedBudget:
+    if stops_at_first(name) or hasattr(planner, "bestCost"):
+        return LearnedBudget()
+    return LearnedBudget(EARNED_BY_UNIFORM_UNSEEN, is_halved=False)
 
 
 @dataclass(frozen=True)
@@ -301,7 +318,15 @@ def _inject_goals(wiring: _Wiring) -> Callable[[], None]:
     return undo
 
 
+def _steer_bounds(wiring: _Wiring) -> Callable[[], None]:
+    assert isinstance(wiring.monitor, SteeringMonitor)
+    return install_steering(wiring.setup, wiring.states, wiring.sampler, wiring.monitor)
+
+
+_MONITORS = {GOAL_INJECTION: goal_monitor, BOUNDS_STEERING: SteeringMonitor}
+
 _INSTALL = {
+    BOUNDS_STEERING: _steer_bounds,
     STATE_SAMPLER: _use_state_sampler,
     VALID_STATE_SAMPLER: _use_valid_state_sampler,
     GOAL_INJECTION: _inject_goals,

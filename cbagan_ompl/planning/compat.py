@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from threading import Lock
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.versions import ompl_version
 from ..errors import MissingDependencyError, PlannerError, show
 
 try:
@@ -33,7 +32,15 @@ from ompl import geometric as og  # noqa: E402
 from ompl import tools as ot  # noqa: E402
 from ompl import util as ou  # noqa: E402
 
-__all__ = ["BINDINGS", "BOOST_PYTHON", "HAS_STATE_SAMPLER_ALLOCATOR", "ob", "og", "ou"]
+__all__ = [
+    "BINDINGS",
+    "BOOST_PYTHON",
+    "HAS_STATE_SAMPLER_ALLOCATOR",
+    "ob",
+    "og",
+    "ompl_version",
+    "ou",
+]
 
 #: Whether planners can be given a StateSampler (OMPL 1.7; not bound in 2.0.0 and 2.0.1).
 HAS_STATE_SAMPLER_ALLOCATOR = hasattr(ob.StateSpace, "setStateSamplerAllocator")
@@ -44,15 +51,6 @@ _BROKEN = {"AORRTC", "LazyLBTRRT"} | ({"ABITstar", "AITstar", "BITstar"} if BOOS
 
 # Planners for other spaces than those of a map.
 _OTHER_SPACES = frozenset({"STRRTstar"})
-
-
-@cache
-def ompl_version() -> str:
-    """Return the version of the installed OMPL package; "unknown" for a build without metadata."""
-    try:
-        return version("ompl")
-    except PackageNotFoundError:
-        return "unknown"
 
 
 def _wrap(wrapper: str, function: Callable[..., Any], home: Any = ob) -> Any:

@@ -22,6 +22,7 @@ from ..common.validation import (
 from ..errors import ConfigError, MapError, RobotError, show
 from ..maps.endpoints import Moves
 from ..maps.grid_map import GridMap
+from ..maps.grid_search import search_kind
 from ..robots.robot import Robot
 from ..sampling.heatmap import Heatmap
 from ..sampling.options import SamplerOptions
@@ -29,7 +30,15 @@ from . import compat
 from .attach import Attachment, attach
 from .compat import ou
 from .goals import heatmap_of_goals, reached_goal, set_goals, split_goals
-from .heatmap_sources import LEARNED, UNIFORM, HeatmapSource, heatmap_source
+from .heatmap_sources import (
+    CORRIDOR,
+    LEARNED,
+    UNIFORM,
+    HeatmapSource,
+    heatmap_source,
+    is_auto,
+    resolve_auto,
+)
 from .hooks import check_planner, hangs_at_optimum
 from .paths import checked_path, follow_path, path_cost
 from .plan_result import PlanResult
@@ -78,7 +87,7 @@ def plan(
         planner: a geometric planner by OMPL's name, such as ``"RRT"`` or ``"InformedRRTstar"``, or
             as the literature writes it, ``"RRT*"``, ``"RRT-Connect"``...
         sampler: one of :data:`cbagan_ompl.planning.heatmap_sources.SAMPLERS`; ``"uniform"`` leaves
-            OMPL's own sampler in place.
+            OMPL's own sampler in place. What ``"auto"`` chose is the ``sampler`` of the result.
         time: limit of the planner's solve, seconds. RRT-like planners stop at their first
             solution, RRT*-like ones go on to the limit.
         iterations: limit of the planner's iterations, whichever comes first.
@@ -89,8 +98,8 @@ def plan(
         radius: short for ``robot=Robot.disc(radius)``, world units.
         snap: how far a start or goal in an obstacle, in the margin around one, or in unknown space
             is moved at most, to the nearest place where the robot may be, world units.
-        model: for the learned sampler, a loaded model or the file of one; the bundled model by
-            default.
+        model: for the learned sampler (or auto), a loaded model or the file of one; the bundled
+            model by default.
         heatmap: to be sampled in place of the learned one: of this map, or an array (H, W) as
             :class:`Heatmap` takes it.
         simplify: let OMPL's path simplifier shorten the path afterwards.
@@ -139,6 +148,9 @@ def plan(
     planner = planner_name(planner)
     is_plain = isinstance(sampler, str) and sampler == UNIFORM
     check_planner(planner, follows_heatmap=not is_plain)
+    if is_auto(sampler) and heatmap is None:
+        sampler = resolve_auto(source)
+        model = None if sampler == CORRIDOR else model
     name, make_heatmap = heatmap_source(sampler, model, heatmap)
     job = _Job(
         map_name=source.name,
@@ -271,6 +283,7 @@ def _result(
         status=run.status,
         planner=job.planner,
         sampler=job.sampler,
+        grid_search=search_kind() if job.sampler in (CORRIDOR, LEARNED) else None,
         hook=attachment.hook if attachment else None,
         ompl_version=compat.ompl_version(),
         seed=job.seed,

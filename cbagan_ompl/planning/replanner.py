@@ -6,12 +6,12 @@ from dataclasses import replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from ..common.validation import whole_number
 from ..maps.checks import check_grid
 from ..maps.grid_map import GridMap
+from ..robots.poses import check_pose
 from ..sampling.heatmap import Heatmap
 from .heatmap_sources import LEARNED, heatmap_source, loaded_model
 from .plan import plan
@@ -123,12 +123,8 @@ class Replanner:
             _frame(grid) != _frame(before) or (self.heatmap.region & ~grid.free).any()
         ):
             return False
-        # Of a pose the position counts; what is no point at all is found out by the plan.
-        position = (
-            np.asarray(start)[:2]
-            if self._last.robot.has_heading and np.shape(start) == (3,)
-            else start
-        )
+        has_heading = self._last.robot.has_heading
+        position = check_pose("start", start)[:2] if has_heading else start
         return self.heatmap.connects(position, self._last.goal[:2])
 
 
