@@ -220,11 +220,11 @@ def attach(
     sampler.prepare()
 
     def undo() -> None:
-        monitor.release()
-        # First: a planner without samplers makes none while its options change. One without a tree
-        # has none; it may be looking at its start, at the beginning of a solve that is not watched.
-        if compat.planner_data(planner).numVertices() > 0:
+        # First: a planner without samplers makes none while its options change. One that has not
+        # sampled yet may be at the beginning of a solve that is not watched.
+        if monitor.has_planned and compat.planner_data(planner).numVertices() > 0:
             planner.clear()
+        monitor.release()
         undo_hook()
 
     return Attachment(hook, sampler, monitor, setup.getGoal(), undo)

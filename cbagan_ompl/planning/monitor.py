@@ -91,6 +91,11 @@ class PlannerMonitor:
         return False
 
     @property
+    def has_planned(self) -> bool:
+        """Whether a solve has returned or the planner has asked for a sample, as far as is seen."""
+        return self._call is not None or any(watch.has_solved for watch in self._watches)
+
+    @property
     def has_solution(self) -> bool:
         """Whether a planner that goes on after its first solution has found it."""
         return self.best_cost() < inf

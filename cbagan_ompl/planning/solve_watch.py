@@ -19,8 +19,9 @@ class SolveWatch:
 
     def __init__(self, target: Any, check: Callable[[], None]) -> None:
         self._calls: list[None] = []
+        self._count = 0
         self._target: Any = target
-        self._watched: Any = _watch_calls(target.solve, check, self._calls)
+        self._watched: Any = self._watch_calls(target.solve, check)
         try:
             target.solve = self._watched
         except AttributeError:
@@ -30,6 +31,11 @@ class SolveWatch:
     def is_solving(self) -> bool:
         """Whether a solve has begun and not returned."""
         return bool(self._calls)
+
+    @property
+    def has_solved(self) -> bool:
+        """Whether a solve has begun at all."""
+        return self._count > 0
 
     def references_to(self, target: Any) -> int:
         """Return how many references of this watch to a target there are."""
@@ -43,19 +49,17 @@ class SolveWatch:
             del self._target.solve
         self._target = self._watched = None
 
+    def _watch_calls(
+        self, function: Callable[..., Any], check: Callable[[], None]
+    ) -> Callable[..., Any]:
+        @wraps(function)
+        def watched(*arguments: Any, **options: Any) -> Any:
+            check()
+            self._count += 1
+            self._calls.append(None)
+            try:
+                return function(*arguments, **options)
+            finally:
+                self._calls.pop()
 
-def _watch_calls(
-    function: Callable[..., Any], check: Callable[[], None], calls: list[None]
-) -> Callable[..., Any]:
-    """Return a function with a list that is as long as there are calls of it in progress."""
-
-    @wraps(function)
-    def watched(*arguments: Any, **options: Any) -> Any:
-        check()
-        calls.append(None)
-        try:
-            return function(*arguments, **options)
-        finally:
-            calls.pop()
-
-    return watched
+        return watched

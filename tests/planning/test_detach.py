@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import gc
+import os
 import resource
+import subprocess
+import sys
 import threading
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -100,6 +104,41 @@ def test_detach_inside_the_planners_own_solve_is_refused(planner: str) -> None:
     checker.attachment = None
     assert "after solve() has returned" in checker.said
     attachment.detach()
+
+
+EARLY = """
+import sys
+from test_detach import DetachingChecker, HEATMAP, GRID, PLANNERS, attach, compat, ou, small_setup
+ou.setLogLevel(ou.LOG_NONE)
+for planner in PLANNERS:
+    for at in range(1, 13):
+        compat.seed_ompl(at)
+        setup = small_setup(GRID, planner)
+        checker = DetachingChecker(setup, at)
+        checker.attachment = attachment = attach(setup, HEATMAP, seed=at)
+        setup.setup()
+        checker.calls = 0
+        setup.getPlanner().solve(0.02)
+        checker.attachment = None
+        attachment.detach()
+print("done")
+"""
+
+
+def test_detach_early_in_the_planners_own_solve_does_not_crash() -> None:
+    """Before it has asked for a sample, too, where it is not known that it plans."""
+    here = Path(__file__)
+    paths = [str(here.parent), str(here.parents[1]), *sys.path]
+    done = subprocess.run(
+        [sys.executable, "-c", EARLY],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "done\n"
 
 
 def test_the_error_leaves_the_solve() -> None:

@@ -187,11 +187,12 @@ import numpy as np
 import cbagan_ompl
 from cbagan_ompl import Heatmap
 from cbagan_ompl.planning.ompl_benchmark import PlannerVariant, RunOptions, run_benchmark
+from cbagan_ompl.planning.workspace import Workspace
 grid = cbagan_ompl.GridMap(np.ones((64, 64), bool))
 variants = [PlannerVariant(p, "uniform", None) for p in ("SORRTstar", "RRTstar")]
 variants += [PlannerVariant("SORRTstar", "corridor", Heatmap.corridor)]
 ends = grid.check_task((5.5, 5.5), (50.2, 40.3))
-recording = run_benchmark("x", grid, ends, variants, RunOptions(2, 0.2))
+recording = run_benchmark("x", Workspace(grid), ends, variants, RunOptions(2, 0.2))
 costs = {name: [run.cost for run in runs] for name, runs in recording.runs.items()}
 for sampler in ("uniform", "corridor"):
     assert max(costs["SORRTstar_" + sampler]) < 1.01 * np.hypot(44.7, 34.8), costs
