@@ -1,7 +1,7 @@
 """Draw the bundled maps, cbagan_ompl/maps/bundled/*.png, and write their tasks.
 
-``tasks.csv`` has positions for robots without heading, ``car_tasks.csv`` poses for a car. Run it from
-anywhere, ``python scripts/make_bundled_maps.py``; it always writes the same maps and tasks.
+``tasks.csv`` has positions for robots without heading, ``car_tasks.csv`` poses for a car. Run it
+from anywhere, ``python scripts/make_bundled_maps.py``; it always writes the same maps and tasks.
 """
 
 from __future__ import annotations
@@ -38,7 +38,8 @@ _AHEAD = 15.0
 SLOT, LANE, WALL, TAKEN = (6, 11), 15, 3, 0.8
 ROWS, COLUMNS = 8, 41
 
-# Start and goal pixels, chosen by eye; in the parking lot free slots. The first of a map is the most instructive one.
+# Start and goal pixels, chosen by eye; in the parking lot free slots. The first of a map is the most
+# instructive one.
 TASKS = {
     # Out of the trap to what lies behind it; into it; past it; out of it, to the mouth's own side.
     "bug_trap": [

@@ -101,7 +101,7 @@ def _differences(there: Any, now: Any, place: str = "") -> Iterator[str]:
 
 def model_files(settings: Settings) -> dict[str, Path]:
     """Return the file of the model of each sampler that has one, the bundled model included."""
-    from ..inference.model_files import find_model
+    from ..inference.bundled_models import find_model
 
     models: dict[str, str | None] = dict(settings.models)
     if {LEARNED, AUTO} & set(settings.samplers) - set(models) - set(settings.heatmap_dirs):

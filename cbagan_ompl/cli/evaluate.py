@@ -93,7 +93,7 @@ def _evaluate(args: argparse.Namespace) -> int:
     )
     from ..evaluation.report import markdown
     from ..evaluation.stored_predictions import load_predictions
-    from ..inference.model_files import find_model
+    from ..inference.bundled_models import find_model
     from ..inference.predictor import load_model
 
     check_at_least("seed", args.seed, 0)

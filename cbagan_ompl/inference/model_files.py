@@ -1,4 +1,4 @@
-"""Exported model files: where the bundled one is, and clear errors for files that are no models.
+"""Exported model files, with clear errors for files that are no models.
 
 All checks here come before torch opens a file: TorchScript archives may carry code, and torch
 believes what they say of their tensors.
@@ -9,17 +9,15 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import os
 import re
 import warnings
 import zipfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..common.files import as_path, read_bytes, read_text
+from ..common.files import read_bytes, read_text
 from ..errors import ModelError, show
 from ..networks.config import MAX_IMAGE_SIZE, MAX_WEIGHTS
 from .archives import MAX_EXPANSION, Archive, pack
@@ -62,56 +60,9 @@ _TENSORS = ("data", "constants")
 _DAMAGED = "the file is damaged", "copy or export it again"
 
 _SHA256 = re.compile(r"[0-9a-f]{64}")
-_NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")
 
-_EXPORT_HINT = "export one with: cbagan-ompl export CHECKPOINT --output MODEL.pt"
-
-
-def bundled_model(name: str | None = None) -> Path:
-    """Return the path of a model that comes with the package.
-
-    Args:
-        name: without ``.pt``; None for the default model.
-
-    Raises:
-        ModelError: this installation has none of that name.
-    """
-    package = Path(__file__).resolve().parent.parent
-    # An installed wheel has the folder inside the package, a checkout beside it.
-    for folder in (package / "models", package.parent / "models"):
-        if (folder / MANIFEST).is_file():
-            manifest = read_manifest(folder / MANIFEST)
-            path = folder / (f"{name}.pt" if name else str(manifest["default"]))
-            if name and not (path.name in manifest["files"] and path.is_file()):
-                present = (folder / file for file in manifest["files"])
-                names = ", ".join(sorted(file.stem for file in present if file.is_file()))
-                raise ModelError(
-                    f"there is no bundled model {show(name)}: give one of {names}, or the path of "
-                    f"a model file (.pt); {_EXPORT_HINT}"
-                )
-            return path
-    raise ModelError(f"this installation has no bundled model; {_EXPORT_HINT}, and give its path")
-
-
-def find_model(model: str | PathLike[str] | None) -> Path:
-    """Return the path of a model file.
-
-    Args:
-        model: a path; or the name of a bundled model, a text without suffix and folder where no
-            file has that name; None for the default model.
-
-    Raises:
-        ModelError: there is no bundled model of that name, or the path is none.
-
-    Example:
-        >>> find_model("cbagan").name
-        'cbagan.pt'
-    """
-    if model is None:
-        return bundled_model()
-    path = as_path(model, ModelError)
-    is_name = isinstance(model, str) and bool(_NAME.fullmatch(model))
-    return bundled_model(str(model)) if is_name and not os.path.lexists(path) else path
+#: How a model file is made, for messages.
+EXPORT_HINT = "export one with: cbagan-ompl export CHECKPOINT --output MODEL.pt"
 
 
 def read_manifest(path: Path) -> dict[str, Any]:
@@ -268,10 +219,10 @@ def _read_file(path: Path) -> bytes:
     except OSError:  # such as a name that is too long, which reading tells
         missing = False
     if missing:
-        raise ModelError(f"{path}: no such file; check the path, or {_EXPORT_HINT}")
+        raise ModelError(f"{path}: no such file; check the path, or {EXPORT_HINT}")
     data = read_bytes(path, ModelError, MAX_MODEL_BYTES)
     if not data:
-        raise ModelError(f"{path}: the file is empty; copy it again, or {_EXPORT_HINT}")
+        raise ModelError(f"{path}: the file is empty; copy it again, or {EXPORT_HINT}")
     return data
 
 
@@ -296,14 +247,14 @@ def _check_listed(path: Path, data: bytes) -> bool:
 
 def _explain_no_zip(path: Path, head: bytes) -> str:
     if head.startswith(b"PK"):
-        return f"{path}: the file is cut short; copy it again, or {_EXPORT_HINT}"
+        return f"{path}: the file is cut short; copy it again, or {EXPORT_HINT}"
     try:
         text = head.decode("utf-8")
     except UnicodeDecodeError:
         text = "\0"
     if "\0" in text:
-        return f"{path}: not an exported model; {_EXPORT_HINT}"
-    return f"{path}: a text file, not an exported model; {_EXPORT_HINT}"
+        return f"{path}: not an exported model; {EXPORT_HINT}"
+    return f"{path}: a text file, not an exported model; {EXPORT_HINT}"
 
 
 def _explain_no_record(path: Path, names: Iterable[str]) -> str:
@@ -318,7 +269,7 @@ def _explain_no_record(path: Path, names: Iterable[str]) -> str:
             f"{path}: a training checkpoint or bare weights, not an exported model; "
             f"run: cbagan-ompl export {path} --output MODEL.pt"
         )
-    return f"{path}: a zip archive, but not an exported model; {_EXPORT_HINT}"
+    return f"{path}: a zip archive, but not an exported model; {EXPORT_HINT}"
 
 
 def _parse_record(path: Path, text: bytes) -> dict[str, Any]:

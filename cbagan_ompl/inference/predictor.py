@@ -17,7 +17,8 @@ from ..maps.grid_map import GridMap
 from ..maps.grid_search import prepare_search
 from ..networks.config import MAX_IMAGE_SIZE
 from ..sampling.heatmap import Heatmap
-from .model_files import find_model, load_script, read_model
+from .bundled_models import find_model
+from .model_files import load_script, read_model
 from .probe import Kind, try_model
 from .scaling import enlarged_values, scaled_map, scaled_shape
 from .torch_state import own_torch_state

@@ -22,7 +22,8 @@ from torch.nn.utils.fusion import fuse_conv_bn_weights
 
 from ..datasets.dataset import Tasks
 from ..errors import ModelError
-from ..inference.model_files import find_model, is_model, load_script
+from ..inference.bundled_models import find_model
+from ..inference.model_files import is_model, load_script
 from ..inference.predictor import load_model
 from ..networks.config import NetworkConfig
 from ..networks.export_model import PatchModel, RegionModel

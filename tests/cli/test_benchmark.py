@@ -63,7 +63,7 @@ def test_interrupt_keeps_finished_tasks(map_folder: Path, tmp_path: Path) -> Non
 @pytest.mark.slow
 def test_several_models_side_by_side(tmp_path: Path) -> None:
     pytest.importorskip("torch")
-    from cbagan_ompl.inference.model_files import bundled_model
+    from cbagan_ompl.inference.bundled_models import bundled_model
 
     copy = shutil.copy(bundled_model(), tmp_path / "copy.pt")
     words = ["benchmark", "bundled:maze", "--tasks-per-map", "1", "--planners", "RRT"]

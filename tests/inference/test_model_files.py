@@ -13,7 +13,7 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from cbagan_ompl import ModelError
-from cbagan_ompl.inference import model_files
+from cbagan_ompl.inference import bundled_models, model_files
 from cbagan_ompl.inference.predictor import load_model
 from cbagan_ompl.training.export import save_script
 
@@ -136,23 +136,23 @@ def test_bundled_model_of_a_wheel_and_of_a_checkout(
     exported: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     package = tmp_path / "cbagan_ompl"
-    monkeypatch.setattr(model_files, "__file__", str(package / "inference" / "model_files.py"))
+    monkeypatch.setattr(bundled_models, "__file__", str(package / "inference" / "x.py"))
     with pytest.raises(ModelError, match=r"no bundled model"):
         load_model()
     for folder in (tmp_path / "models", package / "models"):
         shutil.copytree(exported.parent, folder)
-        assert model_files.bundled_model() == folder / "tiny.pt"
+        assert bundled_models.bundled_model() == folder / "tiny.pt"
     assert load_model().record["name"] == "tiny"
-    assert model_files.find_model("tiny") == package / "models" / "tiny.pt"
+    assert bundled_models.find_model("tiny") == package / "models" / "tiny.pt"
 
 
 def test_names_of_bundled_models(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert load_model("cbagan").record["name"] == "cbagan"
-    assert model_files.find_model("cbagan-worlds") == model_files.bundled_model()
+    assert bundled_models.find_model("cbagan-worlds") == bundled_models.bundled_model()
     with pytest.raises(ModelError, match=r"no bundled model 'cbagen': give one of .*cbagan, cb"):
         load_model("cbagen")
     for path in ("cbagan.pt", "./cbagan", Path("cbagan")):
-        assert model_files.find_model(path) == Path(path)
+        assert bundled_models.find_model(path) == Path(path)
     monkeypatch.chdir(tmp_path)
     Path("cbagan").touch()
-    assert model_files.find_model("cbagan") == Path("cbagan"), "a file of the user's comes first"
+    assert bundled_models.find_model("cbagan") == Path("cbagan"), "a file of the user's comes first"

@@ -17,6 +17,7 @@ from cbagan_ompl.planning import compat
 from cbagan_ompl.planning.compat import ob, og, ou
 from cbagan_ompl.planning.ompl_benchmark import PlannerVariant, RunOptions, run_benchmark
 from cbagan_ompl.planning.problem import make_setup
+from cbagan_ompl.planning.workspace import Workspace
 from cbagan_ompl.sampling.options import NO_ADAPTATION
 from cbagan_ompl.sampling.sampler import HeatmapSampler
 
@@ -31,7 +32,7 @@ def quiet() -> None:
 
 
 def new_setup(grid: GridMap, planner: str = "RRTConnect", range: float = 20.0) -> Any:
-    setup = make_setup(grid, (np.array(START), np.array(GOAL)), 2.0)
+    setup = make_setup(Workspace(grid), (np.array(START), np.array(GOAL)), 2.0)
     instance = getattr(og, planner)(setup.getSpaceInformation())
     instance.setRange(range)
     setup.setPlanner(instance)
@@ -290,7 +291,7 @@ def test_benchmark_of_ours(two_walls: GridMap, corridor: Heatmap) -> None:
     ]
     ends = np.array(START, float), np.array(GOAL, float)
     options = RunOptions(runs=3, time=2.0, range=20.0, tolerance=1.0)
-    recording = run_benchmark("two", two_walls, ends, variants, options)
+    recording = run_benchmark("two", Workspace(two_walls), ends, variants, options)
     assert all(run.sample_counts["learned"] > 0 for run in recording.runs["RRTConnect_own"])
     assert all(np.isfinite(run.cost) for runs in recording.runs.values() for run in runs)
 

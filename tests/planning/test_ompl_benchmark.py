@@ -6,7 +6,7 @@ import signal
 import numpy as np
 import pytest
 
-from cbagan_ompl import GridMap, Heatmap, HeatmapError, PlannerError
+from cbagan_ompl import GridMap, Heatmap, PlannerError, TaskError
 from cbagan_ompl.planning.compat import BOOST_PYTHON
 from cbagan_ompl.planning.ompl_benchmark import (
     PlannerVariant,
@@ -26,7 +26,7 @@ def test_errors_in_events_come_out(two_walls: GridMap) -> None:
     variants = [PlannerVariant("RRTstar", name, lambda *_: far) for name in ("one", "two")]
     options = RunOptions(5, 1.0)
     rounds: list[int] = []
-    with pytest.raises(HeatmapError, match="coordinates of the map"):
+    with pytest.raises(TaskError, match="outside of the heat map's map"):
         run_benchmark("x", Workspace(two_walls), task, variants, options, lambda: rounds.append(1))
     assert len(rounds) == 1
 

@@ -193,7 +193,7 @@ def test_what_is_no_start(two_walls: GridMap, start: Any) -> None:
 @pytest.mark.parametrize(
     ("changes", "kind", "message"),
     [
-        ({"grid": "bundled:maze"}, MapError, "a Replanner takes a GridMap, got 'bundled:maze'"),
+        ({"grid": "bundled:maze"}, MapError, "expected a GridMap, got 'bundled:maze'"),
         ({"sampler": "magic"}, ConfigError, "no sampler 'magic'"),
         ({"seed": -1}, ConfigError, "seed"),
         ({"model": "x.pt"}, ConfigError, "the corridor sampler uses no model"),
@@ -225,5 +225,5 @@ def test_misuse_of_what_plan_takes(
 
 
 def test_map_of_a_plan_must_be_one(two_walls: GridMap) -> None:
-    with pytest.raises(MapError, match="a Replanner takes a GridMap"):
+    with pytest.raises(MapError, match="expected a GridMap"):
         Replanner(two_walls, GOAL, **OPTIONS).plan(START, np.ones((3, 3)))  # type: ignore[arg-type]

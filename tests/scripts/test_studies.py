@@ -45,7 +45,7 @@ def test_paper_suite(folder: Path, tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_paper_tables(folder: Path, tmp_path: Path) -> None:
     pytest.importorskip("torch")
-    from cbagan_ompl.inference.model_files import bundled_model
+    from cbagan_ompl.inference.bundled_models import bundled_model
 
     report = tmp_path / "tables.json"
     words = [str(folder), "--model", f"bundled={bundled_model()}", "--runs", "2", "--tasks", "3"]

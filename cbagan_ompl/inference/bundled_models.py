@@ -1,0 +1,61 @@
+"""The models that come with the package, by name."""
+
+from __future__ import annotations
+
+import os
+import re
+from os import PathLike
+from pathlib import Path
+
+from ..common.files import as_path
+from ..errors import ModelError, show
+from .model_files import EXPORT_HINT, MANIFEST, read_manifest
+
+_NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")
+
+
+def bundled_model(name: str | None = None) -> Path:
+    """Return the path of a model that comes with the package.
+
+    Args:
+        name: without ``.pt``; None for the default model.
+
+    Raises:
+        ModelError: this installation has none of that name.
+    """
+    package = Path(__file__).resolve().parent.parent
+    # An installed wheel has the folder inside the package, a checkout beside it.
+    for folder in (package / "models", package.parent / "models"):
+        if (folder / MANIFEST).is_file():
+            manifest = read_manifest(folder / MANIFEST)
+            path = folder / (f"{name}.pt" if name else str(manifest["default"]))
+            if name and not (path.name in manifest["files"] and path.is_file()):
+                present = (folder / file for file in manifest["files"])
+                names = ", ".join(sorted(file.stem for file in present if file.is_file()))
+                raise ModelError(
+                    f"there is no bundled model {show(name)}: give one of {names}, or the path of "
+                    f"a model file (.pt); {EXPORT_HINT}"
+                )
+            return path
+    raise ModelError(f"this installation has no bundled model; {EXPORT_HINT}, and give its path")
+
+
+def find_model(model: str | PathLike[str] | None) -> Path:
+    """Return the path of a model file.
+
+    Args:
+        model: a path; or the name of a bundled model, a text without suffix and folder where no
+            file has that name; None for the default model.
+
+    Raises:
+        ModelError: there is no bundled model of that name, or the path is none.
+
+    Example:
+        >>> find_model("cbagan").name
+        'cbagan.pt'
+    """
+    if model is None:
+        return bundled_model()
+    path = as_path(model, ModelError)
+    is_name = isinstance(model, str) and bool(_NAME.fullmatch(model))
+    return bundled_model(str(model)) if is_name and not os.path.lexists(path) else path
