@@ -11,7 +11,7 @@ from typing import Any
 from .. import __version__
 from ..common.files import read_bytes, read_text
 from ..errors import ConfigError, HeatmapError, ModelError, show
-from ..planning.heatmap_sources import LEARNED
+from ..planning.heatmap_sources import AUTO, LEARNED
 from .settings import Settings
 from .tasks import BenchmarkTask, heatmap_path
 
@@ -104,7 +104,7 @@ def model_files(settings: Settings) -> dict[str, Path]:
     from ..inference.model_files import find_model
 
     models: dict[str, str | None] = dict(settings.models)
-    if LEARNED in set(settings.samplers) - set(models) - set(settings.heatmap_dirs):
+    if {LEARNED, AUTO} & set(settings.samplers) - set(models) - set(settings.heatmap_dirs):
         models[LEARNED] = None
     return {sampler: find_model(model) for sampler, model in models.items()}
 
