@@ -110,37 +110,44 @@ class Children:
         self._lock = Lock()
         self._idle: list[Child] = []
         self._busy: dict[str, set[Child]] = {}
+        self._ended: set[str] = set()
 
-    def run(self, client: str, call: bytes, shared: bytes) -> Outcome:
-        """Run a call in a child; arguments and errors as for :meth:`Child.run`.
+    def run(self, group: str, call: bytes, shared: bytes) -> Outcome:
+        """Run a call in a child.
 
         Args:
-            client: whose call it is.
-            call: see there.
+            group: of calls that are given up together.
+            call: see :meth:`Child.run`.
             shared: see there.
+
+        Raises:
+            ProcessDied: the process has died, or the group has been given up.
         """
         with self._lock:
-            idle = self._idle.pop() if self._idle else None
-        if idle is None or not idle.is_alive:
-            idle = Child()
+            child = self._idle.pop() if self._idle else None
+        if child is None or not child.is_alive:
+            child = Child()
         with self._lock:
-            self._busy.setdefault(client, set()).add(idle)
+            self._busy.setdefault(group, set()).add(child)
+            if group in self._ended:  # while the child was started
+                child.give_up()
         try:
-            outcome = idle.run(call, shared)
+            outcome = child.run(call, shared)
             with self._lock:
-                self._idle.append(idle)
+                if group not in self._ended:
+                    self._idle.append(child)
             return outcome
         finally:
             with self._lock:
-                self._busy[client].discard(idle)
+                self._busy[group].discard(child)
 
-    def end(self, client: str) -> None:
-        """Give up the calls of a client, and end the children that have none."""
+    def end(self, group: str) -> None:
+        """Give up the calls of a group, those about to begin too, and end idle children."""
         with self._lock:
+            self._ended.add(group)
             idle, self._idle = self._idle, []
-            for child in self._busy.pop(client, set()):
+            for child in self._busy.get(group, ()):
                 child.give_up()
-            self._busy[client] = set()
         for child in idle:
             child.close()
 

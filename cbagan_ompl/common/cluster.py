@@ -14,7 +14,7 @@ import pickle
 import warnings
 from collections.abc import Callable, Generator, Mapping
 from contextlib import suppress
-from itertools import islice
+from itertools import count, islice
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from time import monotonic
@@ -69,6 +69,7 @@ class ClusterExecutor:
         for logger in ("distributed", "distributed.client", "tornado.application"):
             logging.getLogger(logger).setLevel(logging.CRITICAL)  # what matters is raised
         self._client = self._connect()
+        self._numbers = count()  # of what is run
         try:
             self._check_workers()
         except BaseException:
@@ -80,7 +81,7 @@ class ClusterExecutor:
 
     def __exit__(self, *_: object) -> None:
         with suppress(Exception):  # the cluster may be gone, which was said before
-            self._client.run(_end_calls, self._client.id, on_error="ignore")
+            self._client.run(_end_calls, self._client.id, on_error="ignore")  # ends idle children
         self._client.close(_PATIENCE_S)
 
     def completed(
@@ -93,6 +94,7 @@ class ClusterExecutor:
         done: SimpleQueue[Future[Outcome]] = SimpleQueue()
         running: dict[Future[Outcome], str] = {}
         waiting = iter(calls.items())
+        group = f"{self._client.id} {next(self._numbers)}"
         # The result of a call, since the scheduler makes one that is lost again.
         first = self._submit(_hand_on, _dump(shared))
         try:
@@ -102,7 +104,7 @@ class ClusterExecutor:
                 places = (self._threads() or 1) - len(running)
                 for name, arguments in islice(waiting, max(places, 0)):
                     call = _dump((work, arguments))
-                    future = self._submit(_run_call, self._client.id, versions(), call, first)
+                    future = self._submit(_run_call, group, versions(), call, first)
                     running[future] = name
                     future.add_done_callback(done.put)
                 if not running:
@@ -111,7 +113,7 @@ class ClusterExecutor:
                 yield running.pop(future), self._result(future)
                 future.release()
         finally:
-            self._give_up(list(running))
+            self._give_up(list(running), group)
 
     def _connect(self) -> Client:
         from distributed import Client
@@ -194,11 +196,11 @@ class ClusterExecutor:
             raise outcome.error from RuntimeError(outcome.details)
         return outcome.result
 
-    def _give_up(self, unfinished: list[Future[Outcome]]) -> None:
+    def _give_up(self, unfinished: list[Future[Outcome]], group: str) -> None:
         if unfinished:
             with suppress(Exception):  # the cluster may be gone, which is said already
                 self._client.cancel(unfinished, force=True)
-                self._client.run(_end_calls, self._client.id, on_error="ignore")
+                self._client.run(_end_calls, group, on_error="ignore")
 
 
 def _dump(value: object) -> bytes:
@@ -243,15 +245,15 @@ def _hand_on(data: bytes) -> bytes:
     return data
 
 
-def _run_call(client: str, wanted: dict[str, str], call: bytes, shared: bytes) -> Outcome:
+def _run_call(group: str, wanted: dict[str, str], call: bytes, shared: bytes) -> Outcome:
     found = versions()
     if found != wanted:  # a worker that came after the others were checked
         return Outcome(error=ClusterError(f"a worker has {found}, where {wanted} is wanted"))
-    outcome = _children.run(client, call, shared)
+    outcome = _children.run(group, call, shared)
     if isinstance(outcome.error, ProcessDied):
         raise outcome.error  # which the scheduler counts as a death
     return outcome
 
 
-def _end_calls(client: str) -> None:
-    _children.end(client)
+def _end_calls(group: str) -> None:
+    _children.end(group)

@@ -55,7 +55,16 @@ class Cluster:
 
     def start_worker(self, python_path: str = "", *options: str) -> None:
         """Start a worker of one thread, which is not started again when it dies."""
-        words = ["worker", self.address, *_LOCAL, "--no-nanny", "--nthreads", "1"]
+        words = [
+            "worker",
+            self.address,
+            *_LOCAL,
+            "--no-nanny",
+            "--nthreads",
+            "1",
+            "--death-timeout",
+            "60",
+        ]
         words += ["--name", str(len(self.workers)), "--local-directory", str(self.folder)]
         paths = [python_path, *sys.path]  # the helpers of the tests too
         environment = {"PYTHONPATH": os.pathsep.join(filter(None, paths))}
