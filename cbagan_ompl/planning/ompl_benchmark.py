@@ -226,8 +226,9 @@ class BenchmarkSession:
     ) -> None:
         self.setup = make_setup(workspace, endpoints, options.tolerance)
         si = self.setup.getSpaceInformation()
-        self._states = _States(si, self.setup.getStateValidityChecker(), guard)
-        self._motions = _Motions(si, si.getMotionValidator())
+        checker, motions = workspace.make_checks(si)
+        self._states = _States(si, checker, guard)
+        self._motions = _Motions(si, motions)
         self.setup.setStateValidityChecker(self._states)
         si.setMotionValidator(self._motions)
         self.planners = {variant.name: self._planner(variant, options) for variant in variants}
