@@ -48,7 +48,7 @@ def record_inputs(tasks: Sequence[BenchmarkTask], settings: Settings) -> dict[st
         "ompl_version": ompl_version(),
         "model_hashes": {
             sampler: _hash(read_bytes(path, ModelError))
-            for sampler, path in sorted(_models(settings).items())
+            for sampler, path in sorted(model_files(settings).items())
         },
         "maps": {task.map_name: _describe_map(task) for task in tasks},
         "tasks": {task.name: _describe_task(task, settings) for task in tasks},
@@ -99,7 +99,8 @@ def _differences(there: Any, now: Any, place: str = "") -> Iterator[str]:
         yield f"{place} is {show(there)} there and {show(now)} now"
 
 
-def _models(settings: Settings) -> dict[str, Path]:
+def model_files(settings: Settings) -> dict[str, Path]:
+    """Return the file of the model of each sampler that has one, the bundled model included."""
     from ..inference.model_files import find_model
 
     models: dict[str, str | None] = dict(settings.models)

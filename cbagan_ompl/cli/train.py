@@ -71,7 +71,8 @@ def add_train_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--start-from",
         metavar="FILE",
-        help="begin with the weights of another run's checkpoint, which this one refines",
+        help="begin with the weights of another run's checkpoint, or of an exported model: a file, "
+        "or the name of a bundled one such as cbagan-worlds",
     )
     _add_recipe_options(parser.add_argument_group("recipe, the later overrides the earlier"))
     _add_machine_options(parser.add_argument_group("machine"))
@@ -86,7 +87,8 @@ def _add_recipe_options(recipe: Any) -> None:
         "--preset",
         choices=sorted(PRESETS),
         default="best",
-        help="synthetic: what the bundled model was trained with, for images of 256 pixels; best: "
+        help="synthetic: what the bundled model was trained with, for images of 256 pixels; "
+        "refine: what --start-from cbagan-worlds goes on with; best: "
         "the best one for the paper's data; paper: the values of the paper (default: best)",
     )
     recipe.add_argument(

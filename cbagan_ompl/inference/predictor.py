@@ -86,6 +86,7 @@ class Predictor:
     """An exported model, ready to predict.
 
     Attributes:
+        module: the TorchScript module.
         record: what the model file says about itself: ``working_size``, ``metrics``, ``recipe``...
         inference_threads: CPU threads for one prediction. More than one rarely helps at the
             working size, and takes ten times as long where other work has the cores.
@@ -113,7 +114,7 @@ class Predictor:
                 f"{show(record)}; load_model makes one from a file"
             )
         whole_number("working_size", record.get("working_size", 0), 1, MAX_IMAGE_SIZE)
-        self._module = module
+        self.module = module
         self.record = record
         self.inference_threads = 1
 
@@ -236,7 +237,7 @@ class Predictor:
             ),
             own_torch_state(self.inference_threads),
         ):
-            values = self._module(cells, *endpoints)
+            values = self.module(cells, *endpoints)
             result: NDArray[np.float32] = values[:, 0].numpy()
         return result
 

@@ -133,7 +133,7 @@ def loaded_model(model: Predictor | str | PathLike[str] | None = None) -> Predic
 def _on_grid(heatmap: Heatmap | ArrayLike, grid: GridMap) -> Heatmap:
     if not isinstance(heatmap, Heatmap):
         return Heatmap(heatmap, grid)
-    return heatmap if heatmap.grid is grid else Heatmap(heatmap.values, grid)
+    return heatmap if heatmap.grid is grid else Heatmap(heatmap.values, grid, heatmap.heading)
 
 
 # The heat maps that need no model.

@@ -29,6 +29,7 @@ from ..sampling.options import SamplerOptions
 from . import compat
 from .attach import Attachment, attach
 from .compat import ou
+from .goals import heatmap_of_goals, reached_goal, set_goals, split_goals
 from .heatmap_sources import (
     CORRIDOR,
     LEARNED,
@@ -48,7 +49,7 @@ from .problem import (
 )
 from .solving import Limits, SolveRecord, solve
 from .states import state_access
-from .workspace import Endpoints, Workspace
+from .workspace import Workspace
 
 if TYPE_CHECKING:
     from ..inference.predictor import Predictor
@@ -80,7 +81,8 @@ def plan(
     Args:
         grid: the map, or a file for :meth:`GridMap.load`.
         start: (x, y), world; (x, y, yaw) for a robot with heading, radians.
-        goal: the same.
+        goal: the same, or a list of several of which any will do: paths end in one of them, the
+            heat map has the largest of the values that those of each goal have.
         planner: a geometric planner by OMPL's name, such as ``"RRT"`` or ``"InformedRRTstar"``, or
             as the literature writes it, ``"RRT*"``, ``"RRT-Connect"``...
         sampler: one of :data:`cbagan_ompl.planning.heatmap_sources.SAMPLERS`; ``"uniform"`` leaves
@@ -130,11 +132,14 @@ def plan(
         raise MapError(f"grid is a GridMap or the file of a map, got {show(grid)}")
     source = grid if isinstance(grid, GridMap) else GridMap.load(grid)
     workspace = Workspace(source, _robot_of(robot, radius))
+    goals = split_goals(goal)
     moves: Moves = {}
     distance = finite_number("snap", snap, 0.0)
     if distance > 0:
-        (start, goal), moves = workspace.snap(start, goal, distance)
-    endpoints = workspace.check_task(start, goal)
+        if len(goals) > 1:
+            raise ConfigError("snap moves one start and one goal: give one goal, or leave snap out")
+        (start, goals[0]), moves = workspace.snap(start, goals[0], distance)
+    tasks = [workspace.check_task(start, one) for one in goals]
     tolerance = source.resolution
     if goal_tolerance is not None:
         tolerance = finite_number("goal_tolerance", goal_tolerance, 0.0)
@@ -148,7 +153,8 @@ def plan(
     job = _Job(
         map_name=source.name,
         workspace=workspace,
-        endpoints=endpoints,
+        start=tasks[0][0],
+        goals=[task[1] for task in tasks],
         moves=moves,
         tolerance=tolerance,
         planner=planner,
@@ -171,7 +177,8 @@ class _Job:
 
     map_name: str
     workspace: Workspace
-    endpoints: Endpoints
+    start: NDArray[np.float64]
+    goals: list[NDArray[np.float64]]
     moves: Moves
     tolerance: float
     planner: str
@@ -215,8 +222,9 @@ def _run(job: _Job) -> PlanResult:
     began = perf_counter()
     heatmap, attachment = None, None
     if job.make_heatmap is not None:
-        positions = (endpoint[:2] for endpoint in job.endpoints)
-        heatmap = job.make_heatmap(job.workspace.grid, *positions)
+        heatmap = heatmap_of_goals(
+            job.make_heatmap, job.workspace.grid, job.start[:2], [goal[:2] for goal in job.goals]
+        )
         attachment = attach(setup, heatmap, job.options)
     inference_s = perf_counter() - began if attachment else 0.0
     try:
@@ -229,13 +237,16 @@ def _run(job: _Job) -> PlanResult:
 
 
 def _set_up(job: _Job) -> Any:
-    setup = make_setup(job.workspace, job.endpoints, job.tolerance)
+    nearest = min(job.goals, key=lambda goal: float(np.hypot(*(goal - job.start)[:2])))
+    setup = make_setup(job.workspace, (job.start, nearest), job.tolerance)
+    if len(job.goals) > 1:
+        set_goals(setup, job.workspace, job.goals, setup.getGoal().getThreshold())
     setup.setPlanner(compat.planner_class(job.planner)(setup.getSpaceInformation()))
     if job.range is not None and not set_range(setup.getPlanner(), job.range):
         raise ConfigError(f"{job.planner} has no range to set: leave it out")
     setup.setup()
     if hangs_at_optimum(job.planner):
-        stop_at_optimum(setup, job.endpoints, job.tolerance)
+        stop_at_optimum(setup, (job.start, nearest), job.tolerance)
     return setup
 
 
@@ -259,11 +270,12 @@ def _result(
     inference_s: float,
     simplify_s: float,
 ) -> PlanResult:
-    workspace, checked = job.workspace, None
+    workspace, checked, goal = job.workspace, None, job.goals[0]
     if run.is_exact:
-        checked = checked_path(setup, workspace, job.endpoints, job.tolerance)
+        goal = reached_goal(setup, workspace, job.goals)
+        checked = checked_path(setup, workspace, (job.start, goal), job.tolerance)
     is_solved = checked is not None
-    path = np.empty((0, len(job.endpoints[0]))) if checked is None else checked
+    path = np.empty((0, len(job.start))) if checked is None else checked
     return PlanResult(
         solved=is_solved,
         status=run.status,
@@ -275,8 +287,8 @@ def _result(
         seed=job.seed,
         map=job.map_name,
         robot=workspace.robot,
-        start=job.endpoints[0],
-        goal=job.endpoints[1],
+        start=job.start,
+        goal=goal,
         snapped=job.moves,
         goal_tolerance=job.tolerance,
         path=path,

@@ -36,7 +36,7 @@ class PlanResult:
         robot: what moves.
         start: (x, y), world, as in :class:`cbagan_ompl.GridMap`; (x, y, yaw) for robots with
             heading. Where the path begins.
-        goal: the same; where it ends.
+        goal: the same; where it ends. Of several goals the one that it reached, or the first.
         snapped: the endpoints that were moved, ``"start"`` or ``"goal"``, each with the point that
             was ``"given"`` and the ``"distance"`` from it, world units; see ``snap``.
         goal_tolerance: how far from the goal a path may end, world units.
