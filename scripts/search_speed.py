@@ -47,8 +47,8 @@ def main() -> None:
             times += [measure(grid, make_task(grid, rng), model) for _ in range(args.tasks)]
         result["sizes"][str(size)] = summarize(times)
         print_rows(size, result["sizes"][str(size)])
-    if args.json:
-        Path(args.json).write_text(json.dumps(result, indent=1) + "\n")
+        if args.json:  # after each size: large maps take minutes
+            Path(args.json).write_text(json.dumps(result, indent=1) + "\n")
 
 
 def make_task(grid: GridMap, rng: np.random.Generator) -> tuple[Any, Any]:

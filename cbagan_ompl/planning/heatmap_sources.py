@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from importlib.util import find_spec
 from os import PathLike
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from numpy.typing import ArrayLike
 
@@ -45,26 +45,36 @@ _MOST_CORRIDOR_PIXELS = {COMPILED: 1200 * 1200, SCIPY: 150 * 150}
 #: What a result names its sampler when the caller brought the heat map.
 OWN_HEATMAP = "heatmap"
 
+#: A model, loaded or not.
+ModelOrFile: TypeAlias = "Predictor | str | PathLike[str]"
+
 #: Makes the heat map of a map, a start and a goal.
 HeatmapSource = Callable[[GridMap, ArrayLike, ArrayLike], Heatmap]
 
 
-def is_auto(sampler: object) -> bool:
-    """Return whether a sampler is :data:`AUTO`, and :func:`resolve_auto` has to be asked."""
-    return isinstance(sampler, str) and sampler == AUTO
+def resolve_auto(
+    sampler: str, model: ModelOrFile | None, grid: GridMap
+) -> tuple[str, ModelOrFile | None]:
+    """Return a sampler and its model, with what it stands for on a map in place of :data:`AUTO`.
 
+    That is the corridor on maps up to a size, and where torch is not installed, without the model;
+    else learned.
 
-def resolve_auto(grid: GridMap) -> str:
-    """Return the sampler that :data:`AUTO` stands for on a map.
-
-    That is the corridor on maps up to a size, and where torch is not installed; else learned.
+    Args:
+        sampler: one of :data:`SAMPLERS`; others than auto are returned as they are.
+        model: as for :func:`heatmap_source`.
+        grid: the map.
 
     Example:
-        >>> resolve_auto(GridMap(np.ones((64, 64), bool)))
-        'corridor'
+        >>> resolve_auto("auto", "model.pt", GridMap([[1, 1]]))
+        ('corridor', None)
     """
+    if not (isinstance(sampler, str) and sampler == AUTO):
+        return sampler, model
     is_small = grid.free.size <= _MOST_CORRIDOR_PIXELS[search_kind()]
-    return CORRIDOR if is_small or find_spec("torch") is None else LEARNED
+    if is_small or find_spec("torch") is None:
+        return CORRIDOR, None
+    return LEARNED, model
 
 
 def heatmap_source(

@@ -36,7 +36,6 @@ from .heatmap_sources import (
     UNIFORM,
     HeatmapSource,
     heatmap_source,
-    is_auto,
     resolve_auto,
 )
 from .hooks import check_planner, hangs_at_optimum
@@ -148,9 +147,8 @@ def plan(
     planner = planner_name(planner)
     is_plain = isinstance(sampler, str) and sampler == UNIFORM
     check_planner(planner, follows_heatmap=not is_plain)
-    if is_auto(sampler) and heatmap is None:
-        sampler = resolve_auto(source)
-        model = None if sampler == CORRIDOR else model
+    if heatmap is None:
+        sampler, model = resolve_auto(sampler, model, source)
     name, make_heatmap = heatmap_source(sampler, model, heatmap)
     job = _Job(
         map_name=source.name,

@@ -13,7 +13,7 @@ from ..maps.checks import check_grid
 from ..maps.grid_map import GridMap
 from ..robots.poses import check_pose
 from ..sampling.heatmap import Heatmap
-from .heatmap_sources import LEARNED, heatmap_source, loaded_model
+from .heatmap_sources import LEARNED, heatmap_source, loaded_model, resolve_auto
 from .plan import plan
 from .plan_result import PlanResult
 from .workspace import Workspace
@@ -78,6 +78,7 @@ class Replanner:
         self._last: PlanResult | None = None
         seed = options.pop("seed", None)
         self._next_seed = None if seed is None else whole_number("seed", seed, 0)
+        sampler, model = resolve_auto(sampler, model, self.grid)
         if isinstance(sampler, str) and sampler == LEARNED:
             model = loaded_model(model)
         heatmap_source(sampler, model)  # what the first plan would raise, it raises now

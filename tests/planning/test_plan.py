@@ -20,6 +20,7 @@ from cbagan_ompl import (
     MapError,
     PlannerError,
     PlanResult,
+    Replanner,
     TaskError,
     bundled_maps,
     plan,
@@ -404,7 +405,16 @@ def test_auto_takes_the_network_on_large_maps(monkeypatch: pytest.MonkeyPatch) -
 def test_auto_without_torch_takes_the_corridor(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(grid_search, "_load_compiled", lambda: None)
     monkeypatch.setattr(heatmap_sources, "find_spec", lambda name: None)
-    assert resolve_auto(GridMap(np.ones((200, 200), bool))) == "corridor"
+    grid = GridMap(np.ones((200, 200), bool))
+    assert resolve_auto("auto", "model.pt", grid) == ("corridor", None)
+    assert resolve_auto("learned", "model.pt", grid) == ("learned", "model.pt")
+
+
+def test_auto_of_a_replanner(two_walls: GridMap) -> None:
+    replanner = Replanner(two_walls, GOAL, sampler="auto", seed=1)
+    first, second = replanner.plan(START), replanner.plan(START)
+    assert first.sampler == second.sampler
+    assert second.sampler != "auto"
 
 
 def test_auto_takes_no_heat_map(two_walls: GridMap) -> None:
