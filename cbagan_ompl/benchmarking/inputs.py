@@ -109,7 +109,7 @@ def _models(settings: Settings) -> dict[str, Path]:
 
 
 def _describe_map(task: BenchmarkTask) -> dict[str, Any]:
-    grid = task.grid
+    grid = task.workspace.source
     return {
         "width": grid.width,
         "height": grid.height,
@@ -120,10 +120,9 @@ def _describe_map(task: BenchmarkTask) -> dict[str, Any]:
 
 
 def _describe_task(task: BenchmarkTask, settings: Settings) -> dict[str, Any]:
-    (start_x, start_y), (goal_x, goal_y) = task.task.start, task.task.goal
     described: dict[str, Any] = {
-        "start": [float(start_x), float(start_y)],
-        "goal": [float(goal_x), float(goal_y)],
+        "start": [float(value) for value in task.task.start],
+        "goal": [float(value) for value in task.task.goal],
         "optimal_cost": task.task.optimal_cost,
         "family": task.task.family,
     }

@@ -23,6 +23,7 @@ from .options import (
     map_options,
     sampler_options,
 )
+from .robot_options import add_robot_options, robot_of
 
 # Tasks that run at a time, and characters that a report shows of the command.
 _MOST_JOBS, _LONGEST_COMMAND = 1024, 20_000
@@ -65,9 +66,9 @@ def add_benchmark_parser(commands: Any) -> None:
     tasks.add_argument(
         "--tasks",
         metavar="FILE",
-        help="tasks for the maps: .csv (map,start_x,start_y,goal_x,goal_y[,optimal_cost,"
-        "family], where family is the kind of map) or MovingAI .scen (default: those that come "
-        "with a map, otherwise random ones)",
+        help="tasks for the maps: .csv (map,start_x,start_y,goal_x,goal_y[,start_yaw,"
+        "goal_yaw,optimal_cost,family], where family is the kind of map) or MovingAI .scen "
+        "(default: those that come with a map, otherwise random ones)",
     )
     tasks.add_argument(
         "--tasks-per-map",
@@ -75,10 +76,8 @@ def add_benchmark_parser(commands: Any) -> None:
         metavar="N",
         help="at most N tasks of each map, spread over its list (default: all; 4 random ones)",
     )
-    tasks.add_argument(
-        "--radius", type=float, default=0.0, metavar="R", help="radius of the robot (default: 0)"
-    )
     add_map_options(tasks)
+    add_robot_options(parser.add_argument_group("robot", "what moves; a point by default"))
 
     comparison = parser.add_argument_group("comparison")
     comparison.add_argument(
@@ -214,7 +213,7 @@ def _settings(args: argparse.Namespace) -> Settings:
         sampler_options=sampler_options(args),
         models=models,
         heatmap_dirs=folders,
-        radius=args.radius,
+        robot=robot_of(args),
         within=args.within,
     )
 
@@ -231,7 +230,7 @@ def _benchmark(args: argparse.Namespace) -> int:
         )
     settings = _settings(args)
     tasks = select_tasks(
-        args.maps, args.tasks, args.tasks_per_map, args.radius, args.seed, map_options(args)
+        args.maps, args.tasks, args.tasks_per_map, settings.robot, args.seed, map_options(args)
     )
     benchmark = Benchmark(tasks, settings, Path(args.output), args.resume)
     failures = benchmark.run(args.jobs)

@@ -11,6 +11,7 @@ from ..maps.grid_map import GridMap
 from ..maps.loading import bundled_maps
 from ..maps.tasks import tasks_of
 from ..sampling.heatmap import Heatmap
+from .inputs import input_files
 from .options import (
     add_map_options,
     add_sampler_options,
@@ -19,6 +20,7 @@ from .options import (
     map_options,
     sampler_options,
 )
+from .robot_options import add_robot_options, endpoint, robot_of
 
 _PLAN_HELP = """\
 Plan a path on a map with one of OMPL's planners.
@@ -46,23 +48,26 @@ def add_plan_parser(commands: Any) -> None:
     parser.set_defaults(run=_plan)
     parser.add_argument("map", metavar="MAP", help="map file, or bundled:NAME")
     _add_task(parser.add_argument_group("task"))
+    add_robot_options(parser.add_argument_group("robot", "what moves; a point by default"))
     _add_planner(parser.add_argument_group("planner"))
     _add_sampler(parser.add_argument_group("sampler"))
     _add_output(parser.add_argument_group("output"))
 
 
 def _add_task(task: Any) -> None:
-    task.add_argument("--start", type=_point, metavar="X,Y", help="where the path begins")
-    task.add_argument("--goal", type=_point, metavar="X,Y", help="where it ends")
+    task.add_argument(
+        "--start",
+        type=endpoint,
+        metavar="X,Y[,YAW]",
+        help="where the path begins; with a yaw, in radians, for robots with heading",
+    )
+    task.add_argument("--goal", type=endpoint, metavar="X,Y[,YAW]", help="where it ends")
     task.add_argument(
         "--task",
         type=int,
         metavar="N",
         help="number of a task that comes with the map, from 0: a bundled map's, or a line of the "
         "MovingAI .scen beside it (default: 0 when no start and goal are given)",
-    )
-    task.add_argument(
-        "--radius", type=float, default=0.0, metavar="R", help="radius of the robot (default: 0)"
     )
     task.add_argument(
         "--snap",
@@ -119,17 +124,7 @@ def _add_output(output: Any) -> None:
     output.add_argument("--output", metavar="FILE", help="figure of the plan (.png, .pdf, .svg)")
     output.add_argument("--no-tree", action="store_true", help="leave the tree out of the figure")
     output.add_argument("--json", metavar="FILE", help="result as JSON")
-    output.add_argument("--csv", metavar="FILE", help="way points as a table: x,y,index")
-
-
-def _point(text: str) -> tuple[float, float]:
-    try:
-        x, y = (float(part) for part in text.split(","))
-    except ValueError:
-        raise argparse.ArgumentTypeError(
-            f"expected two numbers as X,Y, such as 12.5,-40; got {text!r}"
-        ) from None
-    return x, y
+    output.add_argument("--csv", metavar="FILE", help="way points as a table: x,y[,yaw],index")
 
 
 def _plan(args: argparse.Namespace) -> int:
@@ -140,7 +135,7 @@ def _plan(args: argparse.Namespace) -> int:
 
         check_figure_path(args.output)
     for file in (args.output, args.csv):
-        check_output(file, [args.map, args.heatmap or ""], force=args.force)
+        check_output(file, input_files(args), force=args.force)
     grid = GridMap.load(args.map, **map_options(args))
     start, goal = _endpoints(args, grid)
     result = plan(
@@ -152,7 +147,7 @@ def _plan(args: argparse.Namespace) -> int:
         time=args.time,
         iterations=args.iterations,
         range=args.range,
-        radius=args.radius,
+        robot=robot_of(args),
         snap=args.snap,
         model=args.model,
         heatmap=None if args.heatmap is None else Heatmap.load(args.heatmap, grid),
@@ -175,7 +170,7 @@ def _plan(args: argparse.Namespace) -> int:
 
 def _endpoints(
     args: argparse.Namespace, grid: GridMap
-) -> tuple[tuple[float, float], tuple[float, float]]:
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
     if args.start is not None and args.goal is not None and args.task is None:
         return args.start, args.goal
     if args.start is not None or args.goal is not None:

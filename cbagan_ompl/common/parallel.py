@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import active_children, forkserver, get_context, resource_tracker
+from multiprocessing import (
+    active_children,
+    current_process,
+    forkserver,
+    get_context,
+    resource_tracker,
+)
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerContext
 from multiprocessing.process import BaseProcess
+from pathlib import Path
 from threading import Thread
 from typing import Any, TypeVar
 
@@ -36,6 +44,10 @@ def fork_server(preload: Sequence[str] = ()) -> ForkServerContext:
     Args:
         preload: modules that the server imports, where it is not there yet.
     """
+    if getattr(current_process(), "_inheriting", False):
+        # A new process imports the script that started it, which must not start processes then.
+        # It dies without a traceback; why_died tells the process that waits for it.
+        os._exit(1)
     context = get_context("forkserver")
     context.set_forkserver_preload(list(preload))
     resource_tracker.ensure_running()  # lets interrupts in again, so it must be there before
@@ -45,6 +57,20 @@ def fork_server(preload: Sequence[str] = ()) -> ForkServerContext:
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
     return context
+
+
+def why_died() -> str:
+    """Return why a process has probably died before its work was done."""
+    try:
+        script = Path(str(sys.modules["__main__"].__file__)).read_text("utf-8", "replace")
+    except (OSError, AttributeError, ValueError):  # an interactive session
+        script = "__name__"
+    if "__name__" in script:
+        return "perhaps for lack of memory"
+    return (
+        f"since {sys.argv[0]} starts it, and each process imports that script again: put what it "
+        'does into a function, and call that under `if __name__ == "__main__":`'
+    )
 
 
 def prepare_worker() -> None:
@@ -152,7 +178,7 @@ def run_all(
                 results[positions[future]] = future.result()
         except BrokenProcessPool as error:
             raise DatasetError(
-                f"a process that worked on the {unit} has died, perhaps for lack of memory"
+                f"a process that worked on the {unit} has died, {why_died()}"
             ) from error
         except BaseException:
             for child in set(active_children()) - others:

@@ -83,11 +83,10 @@ def bundled_model(name: str | None = None) -> Path:
             manifest = read_manifest(folder / MANIFEST)
             path = folder / (f"{name}.pt" if name else str(manifest["default"]))
             if name and not (path.name in manifest["files"] and path.is_file()):
-                present = (folder / file for file in manifest["files"])
-                names = ", ".join(sorted(file.stem for file in present if file.is_file()))
+                names = sorted(Path(f).stem for f in manifest["files"] if (folder / f).is_file())
                 raise ModelError(
-                    f"there is no bundled model {show(name)}: give one of {names}, or the path of "
-                    f"a model file (.pt); {_EXPORT_HINT}"
+                    f"there is no bundled model {show(name)}: give one of {', '.join(names)}, or "
+                    f"the path of a model file (.pt); {_EXPORT_HINT}"
                 )
             return path
     raise ModelError(f"this installation has no bundled model; {_EXPORT_HINT}, and give its path")
@@ -97,8 +96,7 @@ def find_model(model: str | PathLike[str] | None) -> Path:
     """Return the path of a model file.
 
     Args:
-        model: a path; or the name of a bundled model, a text without suffix and folder where no
-            file has that name; None for the default model.
+        model: a path; the name of a bundled model, where no file has it; None for the default one.
 
     Raises:
         ModelError: there is no bundled model of that name, or the path is none.
@@ -109,9 +107,9 @@ def find_model(model: str | PathLike[str] | None) -> Path:
     """
     if model is None:
         return bundled_model()
-    path = as_path(model, ModelError)
-    is_name = isinstance(model, str) and bool(_NAME.fullmatch(model))
-    return bundled_model(str(model)) if is_name and not os.path.lexists(path) else path
+    if isinstance(model, str) and _NAME.fullmatch(model) and not os.path.lexists(model):
+        return bundled_model(model)
+    return as_path(model, ModelError)
 
 
 def read_manifest(path: Path) -> dict[str, Any]:

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..common.memory import is_out_of_memory, translate_lack_of_memory
 from ..common.validation import require_torch, truth_value, whole_number
-from ..errors import MapError, ModelError, TaskError, show
+from ..errors import ModelError, TaskError, show
+from ..maps.checks import check_grid
 from ..maps.grid_map import GridMap
 from ..networks.config import MAX_IMAGE_SIZE
 from ..sampling.heatmap import Heatmap
@@ -65,8 +67,12 @@ def load_model(path: str | PathLike[str] | None = None) -> Predictor:
         predictor = Predictor(load_script(model.script), model.record)
         predictor.warm_up()
     except ModelError as error:
-        raise ModelError(f"{source}: {error}; copy or export it again") from error
+        is_damaged = error.__cause__ is None or not is_out_of_memory(error.__cause__)
+        hint = "; copy or export it again" if is_damaged else ""
+        raise ModelError(f"{source}: {error}{hint}") from error
     except Exception as error:  # torch raises many types for damaged archives
+        if is_out_of_memory(error):
+            raise ModelError(f"{source}: not enough memory to load the model") from error
         raise ModelError(
             f"{source}: torch cannot load the model ({type(error).__name__}), the file is "
             "probably damaged; copy or export it again"
@@ -188,11 +194,7 @@ class Predictor:
         self, grid: GridMap, starts: list[ArrayLike], goals: list[ArrayLike], repair: bool
     ) -> list[Heatmap]:
         """Predict for tasks on one map, in one pass of the network."""
-        if not isinstance(grid, GridMap):
-            raise MapError(
-                f"predict takes a GridMap, got {show(grid)}; make one of an array, true where "
-                "free, with GridMap(array)"
-            )
+        check_grid(grid)
         repair = truth_value("repair", repair)
         tasks = [grid.check_task(*task) for task in zip(starts, goals, strict=True)]
         shape = scaled_shape(grid.shape, int(self.record["working_size"]))
@@ -217,12 +219,22 @@ class Predictor:
 
         Returns:
             (B, H, W), the probability that a pixel belongs to the region.
+
+        Raises:
+            ModelError: there is not enough memory.
         """
         import torch
 
         cells = torch.from_numpy(free.astype(np.float32))[:, None]
         endpoints = (torch.from_numpy(points.astype(np.float32)) for points in (start, goal))
-        with own_torch_state(self.inference_threads):
+        with (
+            translate_lack_of_memory(
+                ModelError,
+                f"to predict for cells of shape {tuple(cells.shape)}",
+                "give it fewer at a time, or take a model with a smaller working size",
+            ),
+            own_torch_state(self.inference_threads),
+        ):
             values = self.module(cells, *endpoints)
             result: NDArray[np.float32] = values[:, 0].numpy()
         return result

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import show
 from .image_headers import BrokenImageError, truncated
 
 #: What the files begin with.
@@ -26,6 +27,7 @@ _MAX_HEADER = 2**16
 
 # Bytes of a plain file that are split into numbers at a time, and the digits of a number.
 _BLOCK, _MAX_DIGITS = 2**20, 32
+_IS_SPACE = np.isin(np.arange(256), list(b" \t\n\v\f\r"))
 
 
 def decode_netpbm(
@@ -91,20 +93,43 @@ def _read_numbers(text: bytes, count: int, white: int, name: str) -> NDArray[np.
     space = re.compile(rb"\s")
     filled = at = 0
     while filled < count and at < len(text):
-        after = space.search(text, at + _BLOCK)
-        end = len(text) if after is None else after.start()
-        words = text[at : min(end, at + _BLOCK + _MAX_DIGITS + 1)].split()[: count - filled]
+        after = space.search(text, at + _BLOCK, at + _BLOCK + _MAX_DIGITS + 1)
+        end = at + _BLOCK + _MAX_DIGITS + 1 if after is None else after.start()
+        numbers = _parse_numbers(text[at:end], count - filled, name)
         at = end
-        try:
-            if max(map(len, words), default=0) > _MAX_DIGITS:
-                raise ValueError("a number has too many digits")
-            numbers = np.array(words, dtype=np.int64)
-        except Exception as error:  # NumPy raises several kinds
-            raise BrokenImageError(
-                f"the {name} holds something that is no number: {error}"
-            ) from error
-        if numbers.size and not (numbers.min() >= 0 and numbers.max() <= white):
+        if numbers.size and numbers.max() > white:
             raise BrokenImageError(f"the {name} holds levels outside 0 to {white}")
         levels[filled : filled + len(numbers)] = numbers
         filled += len(numbers)
     return levels[:filled]
+
+
+def _parse_numbers(text: bytes, count: int, name: str) -> NDArray[np.int64]:
+    """Return the first numbers of a text, not more than ``count``.
+
+    What is beyond 10^16 comes out too small, but beyond 10^16 as well. All numbers are
+    computed at once: their last digits, then the tens of those that have some, and so on, in a
+    fifth of the time that splitting the text into words takes.
+    """
+    codes = np.frombuffer(text, np.uint8)
+    digits = codes - np.uint8(ord("0"))
+    is_digit = digits < 10
+    steps = np.diff(is_digit.view(np.int8), prepend=0, append=0)
+    ends = np.flatnonzero(steps == -1)[:count]
+    lengths = ends - np.flatnonzero(steps == 1)[:count]
+    # What follows the last number that is wanted is not looked at.
+    used = slice(int(ends[-1]) + 1 if len(ends) == count else None)
+    is_odd = ~(is_digit[used] | _IS_SPACE[codes[used]])
+    if is_odd.any():
+        first = int(is_odd.argmax())
+        raise BrokenImageError(
+            f"the {name} holds something that is no number: {show(text[first : first + 20])}"
+        )
+    longest = int(lengths.max(initial=0))
+    if longest > _MAX_DIGITS:
+        raise BrokenImageError(f"the {name} holds a number with too many digits, {longest}")
+    numbers: NDArray[np.int64] = digits[ends - 1].astype(np.int64)
+    for place in range(1, longest):
+        longer = np.flatnonzero(lengths > place)
+        numbers[longer] += digits[ends[longer] - 1 - place] * np.int64(10 ** min(place, 16))
+    return numbers

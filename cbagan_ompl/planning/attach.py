@@ -10,7 +10,9 @@ from typing import Any
 
 from ..errors import PlannerError, show
 from ..sampling.adaptation import AdaptiveMixture
-from ..sampling.heatmap import Heatmap, check_heatmap
+from ..sampling.checks import check_heatmap
+from ..sampling.headings import HeadingSampler
+from ..sampling.heatmap import Heatmap
 from ..sampling.options import OPTIMIZING_SHARPNESS, SamplerOptions
 from ..sampling.sampler import HeatmapSampler
 from . import compat, ompl_samplers
@@ -27,7 +29,8 @@ from .hooks import (
     stops_at_first,
 )
 from .monitor import PlannerMonitor, is_informed, is_monitored, release_forgotten
-from .states import StateAccess, position_bounds, state_access
+from .pose_headings import with_headings
+from .states import StateAccess, drives_backwards, position_bounds, state_access
 
 # OMPL's range of a planner that was given none, as a fraction of the extent of the space.
 _OMPL_RANGE = 0.2
@@ -45,10 +48,12 @@ class Attachment:
         >>> from ompl import geometric as og, util as ou
         >>> from cbagan_ompl import GridMap, Heatmap, tasks_of
         >>> from cbagan_ompl.planning.problem import make_setup
+        >>> from cbagan_ompl.planning.workspace import Workspace
         >>> ou.setLogLevel(ou.LOG_NONE)
         >>> grid = GridMap.load("bundled:maze")
         >>> task = tasks_of("bundled:maze", grid)[0]
-        >>> setup = make_setup(grid, grid.check_task(task.start, task.goal), tolerance=1.0)
+        >>> endpoints = grid.check_task(task.start, task.goal)
+        >>> setup = make_setup(Workspace(grid), endpoints, tolerance=1.0)
         >>> setup.setPlanner(og.RRTstar(setup.getSpaceInformation()))
         >>> attachment = attach(setup, Heatmap.uniform(grid))
         >>> attachment.hook, attachment.sample_counts
@@ -57,9 +62,16 @@ class Attachment:
     """
 
     def __init__(
-        self, hook: str, sampler: HeatmapSampler, monitor: PlannerMonitor, undo: Callable[[], None]
+        self,
+        hook: str,
+        sampler: HeatmapSampler,
+        monitor: PlannerMonitor,
+        goal: Any,
+        undo: Callable[[], None],
     ) -> None:
         self.hook = hook
+        # Kept, because whoever plans to it does not keep it.
+        self._goal = goal
         self._sampler = sampler
         self._monitor = monitor
         self._undo: Callable[[], None] | None = undo
@@ -77,7 +89,8 @@ class Attachment:
 
         Raises:
             PlannerError: the planner is in the middle of a solve, from one of whose callbacks this
-                is called: it would go on in a tree that is no more.
+                is called: it would go on in a tree that is no more. That is known of the setup's
+                ``solve``, and of any other once it has asked for a sample.
         """
         if self._undo is not None and self._monitor.is_planning(sys._getframe(1)):
             raise PlannerError(
@@ -120,7 +133,8 @@ def attach(
     the attached one get the goal itself, also while it is attached. Until
     :meth:`Attachment.detach` the setup, the planner and the heat map keep each other alive; where
     nothing else refers to them any more, they are let go by the next ``attach`` or by Python's
-    garbage collector.
+    garbage collector. That does not see references through OMPL: if a validity checker refers to
+    its own setup, or an attribute of the setup to the attachment, only ``detach`` lets go of them.
 
     Args:
         setup: an ``ompl.geometric.SimpleSetup``.
@@ -147,10 +161,12 @@ def attach(
         >>> from ompl import base as ob, geometric as og, util as ou
         >>> from cbagan_ompl import GridMap, GridValidityChecker, Heatmap, tasks_of
         >>> from cbagan_ompl.planning.problem import make_setup
+        >>> from cbagan_ompl.planning.workspace import Workspace
         >>> ou.setLogLevel(ou.LOG_NONE)
         >>> grid = GridMap.load("bundled:rooms")
         >>> task = tasks_of("bundled:rooms", grid)[0]
-        >>> setup = make_setup(grid, grid.check_task(task.start, task.goal), tolerance=1.0)
+        >>> endpoints = grid.check_task(task.start, task.goal)
+        >>> setup = make_setup(Workspace(grid), endpoints, tolerance=1.0)
         >>> setup.setPlanner(og.RRT(setup.getSpaceInformation()))
         >>> with attach(setup, Heatmap.corridor(grid, task.start, task.goal), seed=0) as attachment:
         ...     _ = setup.solve(5.0)
@@ -168,7 +184,9 @@ def attach(
         options = replace(options, sharpness=sharpness)
     rng = options.generator()
     space = setup.getStateSpace()
-    states = state_access(space, rng)
+    heatmap = with_headings(setup, heatmap, options.heading)
+    headings = HeadingSampler(heatmap, options.heading, rng, drives_backwards(space))
+    states = state_access(space, headings)
     release_forgotten()
     injects = hook == GOAL_INJECTION
     monitor = (goal_monitor if injects else PlannerMonitor)(setup, states)
@@ -186,10 +204,13 @@ def attach(
 
     def undo() -> None:
         monitor.release()
-        planner.clear()  # first: a planner without samplers makes none while its options change
+        # First: a planner without samplers makes none while its options change. One without a tree
+        # has none; it may be looking at its start, at the beginning of a solve that is not watched.
+        if compat.planner_data(planner).numVertices() > 0:
+            planner.clear()
         undo_hook()
 
-    return Attachment(hook, sampler, monitor, undo)
+    return Attachment(hook, sampler, monitor, setup.getGoal(), undo)
 
 
 def _planner_of(setup: Any) -> Any:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from threading import Lock
 from typing import Any
@@ -45,6 +46,7 @@ _BROKEN = {"AORRTC", "LazyLBTRRT"} | ({"ABITstar", "AITstar", "BITstar"} if BOOS
 _OTHER_SPACES = frozenset({"STRRTstar"})
 
 
+@cache
 def ompl_version() -> str:
     """Return the version of the installed OMPL package; "unknown" for a build without metadata."""
     try:
@@ -106,10 +108,7 @@ def plane_space(low: NDArray[np.float64], high: NDArray[np.float64]) -> Any:
         low: lower bounds, shape (2,).
         high: upper bounds, shape (2,).
     """
-    bounds = ob.RealVectorBounds(2)
-    for axis in range(2):
-        bounds.setLow(axis, float(low[axis]))
-        bounds.setHigh(axis, float(high[axis]))
+    bounds = _bounds(low, high)
     if not BOOST_PYTHON:
         space = ob.RealVectorStateSpace(2)
         space.setBounds(bounds)
@@ -117,6 +116,34 @@ def plane_space(low: NDArray[np.float64], high: NDArray[np.float64]) -> Any:
     owner = ob.SE2StateSpace()
     owner.setBounds(bounds)
     return owner.getSubspace(0)
+
+
+def _bounds(low: NDArray[np.float64], high: NDArray[np.float64]) -> Any:
+    bounds = ob.RealVectorBounds(2)
+    for axis in range(2):
+        bounds.setLow(axis, float(low[axis]))
+        bounds.setHigh(axis, float(high[axis]))
+    return bounds
+
+
+def pose_space(
+    name: str,
+    turning_radius: float | None,
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+) -> Any:
+    """Return an SE2StateSpace, DubinsStateSpace or ReedsSheppStateSpace.
+
+    Args:
+        name: of the class.
+        turning_radius: of the curves; None for SE2StateSpace.
+        low: lower bounds of positions, shape (2,).
+        high: upper bounds of positions, shape (2,).
+    """
+    kind = getattr(ob, name)
+    space = kind() if turning_radius is None else kind(float(turning_radius))
+    space.setBounds(_bounds(low, high))
+    return space
 
 
 def new_state(space: Any) -> Any:
@@ -173,16 +200,15 @@ def is_exact(status: Any) -> bool:
     return bool(status.getStatus() == ob.PlannerStatus.EXACT_SOLUTION)
 
 
-def path_positions(path: Any) -> NDArray[np.float64]:
-    """Return the states of a geometric path in the plane, (N, 2)."""
-    return np.array([(state[0], state[1]) for state in path.getStates()])
+def tree_edges(data: Any, read: Callable[[Any], tuple[float, float]]) -> NDArray[np.float64]:
+    """Return the edges of an ``ob.PlannerData`` in the plane, (M, 2, 2).
 
-
-def tree_edges(data: Any) -> NDArray[np.float64]:
-    """Return the edges in the plane of an ``ob.PlannerData``, (M, 2, 2)."""
+    Args:
+        data: from :func:`planner_data`.
+        read: returns the (x, y) of a state.
+    """
     count = data.numVertices()
-    states = [data.getVertex(i).getState() for i in range(count)]
-    points = np.array([(state[0], state[1]) for state in states]).reshape(-1, 2)
+    points = np.array([read(data.getVertex(i).getState()) for i in range(count)]).reshape(-1, 2)
     pairs = [(i, j) for i in range(count) for j in _edges_from(data, i)]
     return points[np.array(pairs, dtype=np.intp).reshape(-1, 2)]
 

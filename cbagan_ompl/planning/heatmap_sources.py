@@ -66,15 +66,29 @@ def heatmap_source(
     if model is not None and heatmap is not None:
         raise ConfigError("a model and a heat map were both given: choose one")
     if heatmap is not None:
-        values = heatmap.values if isinstance(heatmap, Heatmap) else heatmap
-        return OWN_HEATMAP, lambda grid, start, goal: Heatmap(values, grid)
+        return OWN_HEATMAP, lambda grid, start, goal: _on_grid(heatmap, grid)
     if sampler == LEARNED:
-        from ..inference.predictor import Predictor, load_model
-
-        if not isinstance(model, Predictor | str | PathLike | None):
-            raise ModelError(f"model is a loaded model or the file of one, got {show(model)}")
-        return sampler, (model if isinstance(model, Predictor) else load_model(model)).predict
+        return sampler, loaded_model(model).predict
     return sampler, _CONTROLS.get(sampler)
+
+
+def loaded_model(model: Predictor | str | PathLike[str] | None = None) -> Predictor:
+    """Return a model, loaded where it is a file; the bundled model for None.
+
+    Raises:
+        ModelError: neither a model nor the file of one.
+    """
+    from ..inference.predictor import Predictor, load_model
+
+    if not isinstance(model, Predictor | str | PathLike | None):
+        raise ModelError(f"model is a loaded model or the file of one, got {show(model)}")
+    return model if isinstance(model, Predictor) else load_model(model)
+
+
+def _on_grid(heatmap: Heatmap | ArrayLike, grid: GridMap) -> Heatmap:
+    if not isinstance(heatmap, Heatmap):
+        return Heatmap(heatmap, grid)
+    return heatmap if heatmap.grid is grid else Heatmap(heatmap.values, grid)
 
 
 # The heat maps that need no model.

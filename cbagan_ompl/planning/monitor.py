@@ -6,6 +6,9 @@ import atexit
 import gc
 import sys
 import weakref
+from collections.abc import Callable
+from contextlib import suppress
+from functools import wraps
 from math import inf
 from threading import get_ident
 from time import perf_counter
@@ -17,7 +20,7 @@ import numpy as np
 from ..sampling.heatmap import Heatmap
 from ..sampling.informed_set import InformedSet
 from .compat import best_cost, new_state, ob, planner_data, start_states, typed_state
-from .states import StateAccess
+from .states import StateAccess, is_distance_bound
 
 # A goal region without end is represented by this many samples of it in the informed set.
 _MAX_GOALS = 100
@@ -50,6 +53,8 @@ class PlannerMonitor:
         self.injected_fraction = 1.0
         self._call: tuple[CodeType, int, int] | None = None
         self._paths_at_call = 0
+        self._solves: list[None] = []
+        self._watched_solve: Callable[..., Any] | None = None
 
     def note_call(self, caller: FrameType) -> None:
         """Note that OMPL asks for a sample, for :meth:`is_planning`.
@@ -62,14 +67,17 @@ class PlannerMonitor:
             self._call = caller.f_code, id(caller), caller.f_lasti
 
     def is_planning(self, caller: FrameType | None) -> bool:
-        """Return whether the planner is in the middle of a solve, as far as can be seen.
+        """Return whether the planner is in the middle of a solve.
 
-        OMPL does not tell. But a frame that has called OMPL, which has asked for a sample, stands
-        at that call until it returns. Paths are added at the end of a solve alone.
+        That of the setup is watched. Of others, such as the planner's own, OMPL does not tell. But
+        a frame that has called OMPL, which has asked for a sample, stands at that call until it
+        returns. Paths are added at the end of a solve alone.
 
         Args:
             caller: the frame that wants to know; it has called Python, not OMPL.
         """
+        if self._solves:
+            return True
         if self._call is None or self._problem.getSolutionCount() != self._paths_at_call:
             return False
         stacks: dict[int, FrameType | None] = {**sys._current_frames()}
@@ -98,11 +106,13 @@ class PlannerMonitor:
     def informed_set(self) -> InformedSet | None:
         """Return the informed set of the task, once the planner has begun to plan.
 
-        It is None for planners that are not informed, and where costs are no path lengths.
+        It is None for planners that are not informed, and where costs are no path lengths, or
+        lengths that may be below those of the positions: these are the lower bound.
         """
         objective = self._problem.getOptimizationObjective()
         is_length = isinstance(objective, ob.PathLengthOptimizationObjective)
-        return self._endpoints() if self._is_informed and is_length else None
+        is_bounded = is_length and is_distance_bound(self._setup.getStateSpace())
+        return self._endpoints() if self._is_informed and is_bounded else None
 
     def connects(self, heatmap: Heatmap) -> bool:
         """Return whether a region connects a start with a goal, once planning has begun."""
@@ -124,6 +134,9 @@ class PlannerMonitor:
     def register(self) -> None:
         """Let :func:`is_monitored` and the interpreter's exit know of this monitor."""
         _alive.add(self)
+        self._watched_solve = _count_calls(self._setup.solve, self._solves)
+        with suppress(AttributeError):  # builds whose setups take no attributes
+            self._setup.solve = self._watched_solve
 
     def refers_to(self, planner: Any) -> bool:
         """Return whether this is the monitor of a planner."""
@@ -131,15 +144,20 @@ class PlannerMonitor:
 
     def is_forgotten(self) -> bool:
         """Return whether nothing but this monitor and OMPL refers to the setup and its planner."""
-        # Each count includes the argument of the call; the setup's C++ object holds the planner.
+        # Each count includes the argument of the call. The setup's C++ object holds the planner,
+        # and the watched solve the setup.
         return (
             self._setup is not None
-            and sys.getrefcount(self._setup) <= 2
+            and sys.getrefcount(self._setup) <= 3
             and sys.getrefcount(self._planner) <= 3
         )
 
     def release(self) -> None:
         """Let go of the planner and its task."""
+        attributes = getattr(self._setup, "__dict__", {})
+        if self._watched_solve is not None and attributes.get("solve") is self._watched_solve:
+            del self._setup.solve
+        self._watched_solve = None
         self._planner = self._problem = self._goal = self._setup = self._call = None
 
     def _endpoints(self) -> InformedSet:
@@ -187,6 +205,20 @@ def is_informed(planner: Any) -> bool:
 def is_monitored(planner: Any) -> bool:
     """Return whether callbacks refer to a planner at the moment."""
     return any(monitor.refers_to(planner) for monitor in _alive)
+
+
+def _count_calls(function: Callable[..., Any], calls: list[None]) -> Callable[..., Any]:
+    """Return a function with a list that is as long as there are calls of it in progress."""
+
+    @wraps(function)
+    def counted(*arguments: Any, **options: Any) -> Any:
+        calls.append(None)
+        try:
+            return function(*arguments, **options)
+        finally:
+            calls.pop()
+
+    return counted
 
 
 def release_forgotten() -> None:

@@ -12,10 +12,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..common.validation import finite_number, positive_number, truth_value, whole_number
-from ..errors import ConfigError, MapError, show
-from ..maps.endpoints import Moves, snap_endpoints
+from ..common.validation import (
+    finite_number,
+    is_finite_number,
+    positive_number,
+    truth_value,
+    whole_number,
+)
+from ..errors import ConfigError, MapError, RobotError, show
+from ..maps.endpoints import Moves
 from ..maps.grid_map import GridMap
+from ..robots.robot import Robot
 from ..sampling.heatmap import Heatmap
 from ..sampling.options import SamplerOptions
 from . import compat
@@ -23,18 +30,17 @@ from .attach import Attachment, attach
 from .compat import ou
 from .heatmap_sources import LEARNED, UNIFORM, HeatmapSource, heatmap_source
 from .hooks import check_planner, hangs_at_optimum
+from .paths import checked_path, follow_path, path_cost
 from .plan_result import PlanResult
 from .planner_names import planner_name
 from .problem import (
-    Endpoints,
-    checked_path,
-    follow_path,
     make_setup,
-    path_length,
     set_range,
     stop_at_optimum,
 )
 from .solving import Limits, SolveRecord, solve
+from .states import state_access
+from .workspace import Endpoints, Workspace
 
 if TYPE_CHECKING:
     from ..inference.predictor import Predictor
@@ -50,6 +56,7 @@ def plan(
     time: float = 1.0,
     iterations: int | None = None,
     range: float | None = None,
+    robot: Robot | None = None,
     radius: float = 0.0,
     snap: float = 0.0,
     model: Predictor | str | PathLike[str] | None = None,
@@ -64,8 +71,8 @@ def plan(
 
     Args:
         grid: the map, or a file for :meth:`GridMap.load`.
-        start: (x, y), world.
-        goal: (x, y), world.
+        start: (x, y), world; (x, y, yaw) for a robot with heading, radians.
+        goal: the same.
         planner: a geometric planner by OMPL's name, such as ``"RRT"`` or ``"InformedRRTstar"``, or
             as the literature writes it, ``"RRT*"``, ``"RRT-Connect"``...
         sampler: one of :data:`cbagan_ompl.planning.heatmap_sources.SAMPLERS`; ``"uniform"`` leaves
@@ -75,7 +82,9 @@ def plan(
         iterations: limit of the planner's iterations, whichever comes first.
         range: longest edge that the planner adds, world units; by default OMPL's choice (a
             fifth of the map's diagonal).
-        radius: of the robot, world units; obstacles are inflated by it.
+        robot: what moves, a point by default. Its shape and turning radius choose the state space
+            and the checks, see :class:`cbagan_ompl.Robot`.
+        radius: short for ``robot=Robot.disc(radius)``, world units.
         snap: how far a start or goal in an obstacle, in the margin around one, or in unknown space
             is moved at most, to the nearest place where the robot may be, world units.
         model: for the learned sampler, a loaded model or the file of one; the bundled model by
@@ -96,7 +105,8 @@ def plan(
         The result; not finding a path in time is no error, ``solved`` is False then.
 
     Raises:
-        MapError: an unusable map or radius.
+        MapError: an unusable map or radius, or a map that the robot fits nowhere on.
+        RobotError: no robot, or a robot and a radius.
         TaskError: start or goal outside, in an obstacle, equal, or in separate parts.
         PlannerError: an unknown planner, or one that no hook reaches on this OMPL.
         ConfigError: an option that makes no sense.
@@ -111,22 +121,23 @@ def plan(
     if not isinstance(grid, GridMap | str | PathLike):
         raise MapError(f"grid is a GridMap or the file of a map, got {show(grid)}")
     source = grid if isinstance(grid, GridMap) else GridMap.load(grid)
-    space_map = source.inflated(radius)
+    workspace = Workspace(source, _robot_of(robot, radius))
     moves: Moves = {}
-    if snap != 0:
-        distance = finite_number("snap", snap, 0.0)
-        (start, goal), moves = snap_endpoints(space_map, start, goal, distance)
-    endpoints = space_map.check_task(start, goal)
-    tolerance = space_map.resolution
+    distance = finite_number("snap", snap, 0.0)
+    if distance > 0:
+        (start, goal), moves = workspace.snap(start, goal, distance)
+    endpoints = workspace.check_task(start, goal)
+    tolerance = source.resolution
     if goal_tolerance is not None:
         tolerance = finite_number("goal_tolerance", goal_tolerance, 0.0)
     options, seed = _with_seed(SamplerOptions.of(options, changes))
     planner = planner_name(planner)
-    check_planner(planner, follows_heatmap=sampler != UNIFORM)
+    is_plain = isinstance(sampler, str) and sampler == UNIFORM
+    check_planner(planner, follows_heatmap=not is_plain)
     name, make_heatmap = heatmap_source(sampler, model, heatmap)
     job = _Job(
         map_name=source.name,
-        grid=space_map,
+        workspace=workspace,
         endpoints=endpoints,
         moves=moves,
         tolerance=tolerance,
@@ -149,7 +160,7 @@ class _Job:
     """Everything that a plan needs, checked."""
 
     map_name: str
-    grid: GridMap
+    workspace: Workspace
     endpoints: Endpoints
     moves: Moves
     tolerance: float
@@ -162,6 +173,21 @@ class _Job:
     seed: int
     simplify: bool
     keep_tree: bool
+
+
+def _robot_of(robot: Robot | None, radius: float) -> Robot:
+    """Return the robot that is meant by both options."""
+    if robot is not None and not isinstance(robot, Robot):
+        raise RobotError(
+            f"robot is a Robot, such as Robot.rectangle(length, width), got {show(robot)}"
+        )
+    if not is_finite_number(radius) or radius < 0:
+        raise MapError(f"the robot radius must be a length of at least 0, got {show(radius)}")
+    if radius == 0:
+        return robot or Robot.point()
+    if robot is not None:
+        raise RobotError("give robot or radius, which is short for robot=Robot.disc(radius)")
+    return Robot.disc(radius)
 
 
 def _with_seed(options: SamplerOptions) -> tuple[SamplerOptions, int]:
@@ -179,7 +205,8 @@ def _run(job: _Job) -> PlanResult:
     began = perf_counter()
     heatmap, attachment = None, None
     if job.make_heatmap is not None:
-        heatmap = job.make_heatmap(job.grid, *job.endpoints)
+        positions = (endpoint[:2] for endpoint in job.endpoints)
+        heatmap = job.make_heatmap(job.workspace.grid, *positions)
         attachment = attach(setup, heatmap, job.options)
     inference_s = perf_counter() - began if attachment else 0.0
     try:
@@ -192,7 +219,7 @@ def _run(job: _Job) -> PlanResult:
 
 
 def _set_up(job: _Job) -> Any:
-    setup = make_setup(job.grid, job.endpoints, job.tolerance)
+    setup = make_setup(job.workspace, job.endpoints, job.tolerance)
     setup.setPlanner(compat.planner_class(job.planner)(setup.getSpaceInformation()))
     if job.range is not None and not set_range(setup.getPlanner(), job.range):
         raise ConfigError(f"{job.planner} has no range to set: leave it out")
@@ -203,7 +230,8 @@ def _set_up(job: _Job) -> Any:
 
 
 def _tree_of(setup: Any) -> NDArray[np.float64]:
-    return compat.tree_edges(compat.planner_data(setup.getPlanner()))
+    read = state_access(setup.getStateSpace()).read
+    return compat.tree_edges(compat.planner_data(setup.getPlanner()), read)
 
 
 def _simplify(setup: Any) -> float:
@@ -221,11 +249,11 @@ def _result(
     inference_s: float,
     simplify_s: float,
 ) -> PlanResult:
-    checked = None
+    workspace, checked = job.workspace, None
     if run.is_exact:
-        checked = checked_path(setup, job.grid, job.endpoints, job.tolerance)
+        checked = checked_path(setup, workspace, job.endpoints, job.tolerance)
     is_solved = checked is not None
-    path = np.empty((0, 2)) if checked is None else checked
+    path = np.empty((0, len(job.endpoints[0]))) if checked is None else checked
     return PlanResult(
         solved=is_solved,
         status=run.status,
@@ -235,13 +263,14 @@ def _result(
         ompl_version=compat.ompl_version(),
         seed=job.seed,
         map=job.map_name,
+        robot=workspace.robot,
         start=job.endpoints[0],
         goal=job.endpoints[1],
         snapped=job.moves,
         goal_tolerance=job.tolerance,
         path=path,
-        trajectory=follow_path(path, job.grid.resolution / 2),
-        cost=path_length(path) if is_solved else inf,
+        trajectory=follow_path(setup, workspace, path, workspace.source.resolution / 2),
+        cost=path_cost(setup, workspace, path) if is_solved else inf,
         inference_s=inference_s,
         planning_s=run.planning_s,
         simplify_s=simplify_s,
@@ -252,6 +281,7 @@ def _result(
         nodes=run.nodes,
         nodes_at_first_solution=run.nodes_at_first_solution if is_solved else None,
         sample_counts=attachment.sample_counts if attachment else {"learned": 0, "uniform": 0},
+        heatmap_kept=False,
         heatmap=heatmap,
         tree=_tree_of(setup) if job.keep_tree else None,
     )

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from ..common.files import as_path, make_folder, write_atomically
+from ..common.memory import translate_lack_of_memory
 from ..datasets.dataset import Tasks
 from ..errors import ConfigError, show
 from ..inference.model_files import translate_damage
@@ -107,14 +108,17 @@ def train(
     Raises:
         ConfigError: ``resume`` with another recipe or other tasks, or without it although the
             folder holds a run; ``start_from`` with other networks; the folder cannot be made; no
-            such device; the loss is not finite; or the processes cannot share a batch evenly.
+            such device; the loss is not finite; the processes cannot share a batch evenly; or
+            there is not enough memory.
         DatasetError: the images are of a size that the networks cannot take.
         MissingDependencyError: ``tensorboard`` without the package of that name.
         ModelError: a checkpoint that cannot be read or written.
     """
     folder, target = as_path(output), pick_device(device)
     check_trainable(source.size, config)
-    with process_group(target) as group:
+    task = f"to train on batches of {config.batch_size} images of {source.size} pixels"
+    cure = "lower batch_size (--set batch_size=N), or train smaller networks"
+    with translate_lack_of_memory(ConfigError, task, cure), process_group(target) as group:
         if config.batch_size % group.size:
             raise ConfigError(
                 f"batches of {config.batch_size} cannot be shared evenly by {group.size} processes"

@@ -13,10 +13,11 @@ from cbagan_ompl.benchmarking.logs import parse_log
 from cbagan_ompl.benchmarking.settings import Settings
 from cbagan_ompl.benchmarking.tasks import BenchmarkTask, heatmap_file
 from cbagan_ompl.benchmarking.worker import Job, run_job
+from cbagan_ompl.planning.workspace import Workspace
 
 
 def test_heat_maps_of_others(two_walls: GridMap, corridor: Heatmap, tmp_path: Path) -> None:
-    task = BenchmarkTask(two_walls, 0, Task(START, GOAL))
+    task = BenchmarkTask(Workspace(two_walls), 0, Task(START, GOAL))
     with pytest.raises(HeatmapError, match=r"neither .*two_walls_0\.npy nor two_walls_0\.png"):
         heatmap_file(str(tmp_path), task)
     cv2.imwrite(str(tmp_path / "two_walls_0.png"), (corridor.values * 255).astype(np.uint8))

@@ -255,7 +255,7 @@ except ConfigError as error:
 def test_a_full_disk_leaves_the_old_file(tmp_path: Path) -> None:
     (tmp_path / "a").write_text("old")
     done = subprocess.run(
-        [sys.executable, "-c", _FULL_DISK, str(tmp_path / "a")],
+        [sys.executable, "-B", "-c", _FULL_DISK, str(tmp_path / "a")],
         capture_output=True,
         text=True,
         check=True,

@@ -2,9 +2,12 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from multiprocessing import active_children
 from multiprocessing.context import ForkServerProcess
+from pathlib import Path
 
 import pytest
 
@@ -24,6 +27,22 @@ def test_processes_do_not_hear_interrupts() -> None:
 def test_a_process_that_dies() -> None:
     with pytest.raises(DatasetError, match="a process that worked on the maps has died"):
         run_all(os._exit, [(3,)], 1, "maps", progress=False)
+
+
+def test_a_script_without_a_guard_is_told_so(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import time\n"
+        "from cbagan_ompl.common.parallel import run_all\n"
+        "run_all(time.sleep, [(0,)], 1, 'maps', progress=False)\n"
+    )
+    command = [sys.executable, str(script)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 1
+    assert done.stderr.count("cbagan_ompl.errors.DatasetError") == 1
+    said = done.stderr.splitlines()[-1]
+    assert f"has died, since {script} starts it, and each process imports that script" in said
+    assert said.endswith('call that under `if __name__ == "__main__":`')
 
 
 @pytest.mark.usefixtures("interruptible")

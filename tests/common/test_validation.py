@@ -155,7 +155,7 @@ def test_packages() -> None:
     with pytest.raises(MissingDependencyError) as caught:
         require("no_such_package_at_all", "train")
     assert "this needs no_such_package_at_all, which cannot be imported" in str(caught.value)
-    assert "pip install 'cbagan-ompl[train]'" in str(caught.value)
+    assert "in the clone of cbagan-ompl with: pip install -e '.[train]'" in str(caught.value)
 
 
 def test_torch_is_named_where_it_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -137,7 +137,7 @@ def test_bundled_model_of_a_wheel_and_of_a_checkout(
 ) -> None:
     package = tmp_path / "cbagan_ompl"
     monkeypatch.setattr(model_files, "__file__", str(package / "inference" / "model_files.py"))
-    with pytest.raises(ModelError, match="no bundled model"):
+    with pytest.raises(ModelError, match=r"no bundled model"):
         load_model()
     for folder in (tmp_path / "models", package / "models"):
         shutil.copytree(exported.parent, folder)

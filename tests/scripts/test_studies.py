@@ -57,3 +57,18 @@ def test_paper_tables(folder: Path, tmp_path: Path) -> None:
         assert samplers["uniform"]["nodes_ratio"] == [1, 1, 1]
         assert samplers["bundled"]["nodes"][0] > 1
         assert samplers["bundled"]["inference_ms"][0] > 0
+
+
+@pytest.mark.slow
+def test_replanning(tmp_path: Path) -> None:
+    pytest.importorskip("torch")
+    report = tmp_path / "replanning.json"
+    words = ["bundled:rooms", "--tasks-per-map", "1", "--cycles", "4", "--json", str(report)]
+    printed = run_script(STUDIES / "replanning.py", *words)
+    result = json.loads(report.read_text())
+    for scene in ("static", "obstacles"):
+        assert f"{scene} kept" in printed
+        assert result[scene].keys() == {"uniform", "fresh", "kept"}
+        assert all(of["cycles"] == 4 for of in result[scene].values())
+        assert result[scene]["uniform"]["kept"] == result[scene]["fresh"]["kept"] == 0
+    assert result["static"]["kept"]["kept"] >= 0.5

@@ -60,6 +60,15 @@ def test_resumed_run_equals_uninterrupted(
     ]
 
 
+def test_lack_of_memory_is_said(
+    source: DatasetSource, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(loop, "discriminator_step", lambda *_: torch.empty(2**50))
+    said = r"not enough memory to train on batches of \d+ images of \d+ pixels: lower batch_size"
+    with pytest.raises(ConfigError, match=said):
+        train(source, TINY, tmp_path, device="cpu", progress=False)
+
+
 def test_a_resumed_run_on_synthetic_maps_equals_an_uninterrupted_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
