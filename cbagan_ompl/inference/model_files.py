@@ -81,14 +81,15 @@ def bundled_model(name: str | None = None) -> Path:
     for folder in (package / "models", package.parent / "models"):
         if (folder / MANIFEST).is_file():
             manifest = read_manifest(folder / MANIFEST)
-            path = folder / (f"{name}.pt" if name else str(manifest["default"]))
-            if name and not (path.name in manifest["files"] and path.is_file()):
-                names = sorted(Path(f).stem for f in manifest["files"] if (folder / f).is_file())
+            if name is None:
+                return folder / str(manifest["default"])
+            names = sorted(Path(f).stem for f in manifest["files"] if (folder / f).is_file())
+            if name not in names:
                 raise ModelError(
                     f"there is no bundled model {show(name)}: give one of {', '.join(names)}, or "
                     f"the path of a model file (.pt); {_EXPORT_HINT}"
                 )
-            return path
+            return folder / f"{name}.pt"
     raise ModelError(f"this installation has no bundled model; {_EXPORT_HINT}, and give its path")
 
 
@@ -204,10 +205,7 @@ def read_record(path: Path) -> dict[str, Any]:
 
 
 def read_script(path: Path) -> bytes:
-    """Read any TorchScript file, and check the length of each of its tensors.
-
-    Returns:
-        Its archive, without what torch does not need.
+    """Return the archive of any TorchScript file, after a check of the length of each tensor.
 
     Raises:
         ModelError: the file is missing, no TorchScript file, or damaged.
