@@ -16,6 +16,7 @@ from ..datasets.synthetic import HARD_DETOUR
 from ..errors import ConfigError
 from ..map_generators import MAP_GENERATORS
 from ..maps.grid_map import GridMap
+from .options import add_scheduler_option, open_executor
 
 # Processes that the pools of Python start, at most.
 _MAX_JOBS = 1024
@@ -201,6 +202,7 @@ def _add_label_options(parser: argparse.ArgumentParser) -> None:
         help=f"longest edge of RRT in pixels (default: the size / {1 / RANGE:g})",
     )
     _add_number(parser, "--jobs", 1, "number of processes")
+    add_scheduler_option(parser)
 
 
 def _add_number(
@@ -261,7 +263,8 @@ def _settings(args: argparse.Namespace, **of_maps: Any) -> GenerationSettings:
 def _generate(args: argparse.Namespace) -> int:
     settings = _settings(args, maps=args.maps, generators=args.generators, varied=args.varied)
     whole_number("jobs", args.jobs, 1, _MAX_JOBS)
-    generate(Path(args.output), settings, args.jobs, args.resume)
+    with open_executor(args) as executor:
+        generate(Path(args.output), settings, args.jobs, args.resume, executor=executor)
     return _report_new_set(args, settings)
 
 
@@ -271,7 +274,8 @@ def _label(args: argparse.Namespace) -> int:
     maps = {path: GridMap.load(path) for path in args.maps}
     if len(maps) < len(args.maps):
         raise ConfigError("a map is given twice; a set has each map once")
-    label_maps(Path(args.output), maps, settings, args.jobs, args.resume)
+    with open_executor(args) as executor:
+        label_maps(Path(args.output), maps, settings, args.jobs, args.resume, executor=executor)
     return _report_new_set(args, settings)
 
 
@@ -290,7 +294,10 @@ def _noise(args: argparse.Namespace) -> int:
     if args.tasks is not None:
         tasks = choose_tasks(tasks, args.tasks, args.seed)
     longest_edge = tasks.size * RANGE if args.range is None else args.range
-    values = label_noise(tasks, args.runs, longest_edge, args.seed, args.jobs)
+    with open_executor(args) as executor:
+        values = label_noise(
+            tasks, args.runs, longest_edge, args.seed, args.jobs, executor=executor
+        )
     print(f"agreement of labels on {len(tasks)} tasks, {args.runs} runs of RRT each")
     for name, scores in values.items():
         if isinstance(scores, dict):

@@ -13,6 +13,7 @@ from ..datasets.dataset import load_dataset
 from ..datasets.synthetic import HARD_DETOUR, TASKS_PER_MAP, SyntheticSettings
 from ..errors import ConfigError
 from ..networks.config import NETWORKS
+from ..training.checkpoint_files import read_checkpoint
 from ..training.config import LAST, PRESETS, TrainingConfig
 from ..training.task_sources import DatasetSource, SyntheticSchedule, TaskSource, synthetic_source
 
@@ -188,6 +189,8 @@ def _train(args: argparse.Namespace) -> int:
         whole_number("--threads", args.threads, 1, _MAX_THREADS)
     if args.synthetic == (args.dataset is not None):
         raise ConfigError("tasks come from a DATASET or from --synthetic: give one of both")
+    if args.start_from is not None:
+        read_checkpoint(Path(args.start_from))
     require_torch()
     import torch
 
@@ -252,6 +255,7 @@ def _print_scores(result: dict[str, Any]) -> None:
 
 
 def _export(args: argparse.Namespace) -> int:
+    read_checkpoint(Path(args.checkpoint))
     require_torch()
     from ..training.export import export
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.files import make_folder, read_text, write_json
-from ..common.parallel import run_all
+from ..common.parallel import Executor, LocalExecutor, run_each
 from ..common.validation import (
     check_fraction,
     finite_number,
@@ -147,7 +147,12 @@ class GenerationSettings:
 
 
 def generate(
-    folder: Path, settings: GenerationSettings, jobs: int, resume: bool, progress: bool = True
+    folder: Path,
+    settings: GenerationSettings,
+    jobs: int,
+    resume: bool,
+    progress: bool = True,
+    executor: Executor | None = None,
 ) -> None:
     """Generate a training set.
 
@@ -157,32 +162,37 @@ def generate(
         jobs: number of processes.
         resume: continue in a folder where a run was interrupted: only missing maps are made.
         progress: show a progress bar.
+        executor: where maps are made; by default ``jobs`` processes of this machine. The files are
+            the same, and this process writes them.
 
     Raises:
         ConfigError: ``resume`` with other settings, or without it although the folder holds a
             set; or files that are no part of such a set are in its place.
         MissingDependencyError: geodesic distances are needed, and numba is not installed.
-        DatasetError: a file cannot be written, or a map has no task of the wanted distance.
+        DatasetError: a file cannot be written, a map has no task of the wanted distance, or a
+            process has died.
+        ClusterError: the cluster cannot do the work.
     """
     if settings.needs_distances:
         require("numba", "train")
     prepare_folder(folder, settings, resume, {})
-    write_missing(folder, settings, jobs, progress, [None] * settings.maps)
+    executor = executor or LocalExecutor(jobs)
+    write_missing(folder, settings, executor, progress, [None] * settings.maps)
 
 
 def write_missing(
     folder: Path,
     settings: GenerationSettings,
-    jobs: int,
+    executor: Executor,
     progress: bool,
     maps: Sequence[NDArray[np.bool_] | None],
 ) -> None:
     """Write the maps of a set that are not there yet, their tasks, and the lists.
 
     Args:
-        folder: see :func:`generate`, and so are ``settings``, ``jobs`` and ``progress``.
+        folder: of the set.
         settings: of the set.
-        jobs: number of processes.
+        executor: where maps are labelled; this process writes the files.
         progress: show a progress bar.
         maps: (S, S) each, true where free; None for a map that is generated.
 
@@ -190,8 +200,14 @@ def write_missing(
         DatasetError: a file cannot be written, or a map has no task of the wanted distance.
     """
     missing = [k for k in range(settings.maps) if not _task_list(folder, k).is_file()]
-    calls = [(folder, settings, k, maps[k]) for k in missing]
-    run_all(_write_map_and_tasks, calls, jobs, "maps", progress)
+    calls = {f"map_{k}": (settings, k, maps[k]) for k in missing}
+
+    def write(_: str, made: tuple[int, Tasks]) -> None:
+        number, tasks = made
+        write_map(folder, number, tasks.maps[0] > 0)
+        write_tasks(folder, number, tasks)
+
+    run_each(_make_map_and_tasks, calls, executor, write, "maps", progress)
     rows = [task_row(k, n) for k in range(settings.maps) for n in range(settings.tasks)]
     write_lists(folder, rows, settings.select_test_tasks())
 
@@ -246,23 +262,21 @@ def _task_list(folder: Path, number: int) -> Path:
     return folder / "tasks" / f"map_{number}.csv"
 
 
-def _write_map_and_tasks(
-    folder: Path, settings: GenerationSettings, number: int, free: NDArray[np.bool_] | None
-) -> None:
-    """Generate a map unless there is one, its tasks and their labels, and write them."""
+def _make_map_and_tasks(
+    settings: GenerationSettings, number: int, free: NDArray[np.bool_] | None
+) -> tuple[int, Tasks]:
+    """Return the number of a map, and the map, made unless it is given, with its labelled tasks."""
     free = generate_map(settings, number) if free is None else free
     grid = GridMap(free)
     rng = np.random.default_rng((settings.seed, number, 1))
     labelled = [_generate_task(grid, settings, rng) for _ in range(settings.tasks)]
-    write_map(folder, number, free)
-    tasks = Tasks(
+    return number, Tasks(
         free[None].astype(np.uint8),
         np.zeros(settings.tasks, dtype=np.int64),
         np.array([endpoints[0] for endpoints, _ in labelled], dtype=np.float32),
         np.array([endpoints[1] for endpoints, _ in labelled], dtype=np.float32),
         np.array([region for _, region in labelled], dtype=np.uint8),
     )
-    write_tasks(folder, number, tasks)
 
 
 def generate_map(settings: GenerationSettings, number: int) -> NDArray[np.bool_]:

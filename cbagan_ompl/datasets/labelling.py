@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.parallel import Executor, LocalExecutor
 from ..common.validation import require
 from ..inference.scaling import scaled_free, scaled_shape
 from ..maps.grid_map import GridMap
@@ -22,6 +23,7 @@ def label_maps(
     jobs: int,
     resume: bool,
     progress: bool = True,
+    executor: Executor | None = None,
 ) -> None:
     """Make a training set of given maps: random tasks on them, with their labels.
 
@@ -37,11 +39,14 @@ def label_maps(
         jobs: number of processes.
         resume: continue in a folder where a run was interrupted.
         progress: show a progress bar.
+        executor: where maps are labelled; by default ``jobs`` processes of this machine.
 
     Raises:
         ConfigError: see :func:`generate`; or the maps are others than before.
         MissingDependencyError: geodesic distances are needed, and numba is not installed.
-        DatasetError: a file cannot be written, or a map has no task of the wanted distance.
+        DatasetError: a file cannot be written, a map has no task of the wanted distance, or a
+            process has died.
+        ClusterError: the cluster cannot do the work.
     """
     if settings.needs_distances:
         require("numba", "train")
@@ -49,7 +54,7 @@ def label_maps(
     hashes = [hashlib.sha256(np.packbits(free).tobytes()).hexdigest() for free in squares]
     record = {"maps": dict(zip(maps, hashes, strict=True))}
     prepare_folder(folder, settings, resume, record)
-    write_missing(folder, settings, jobs, progress, squares)
+    write_missing(folder, settings, executor or LocalExecutor(jobs), progress, squares)
 
 
 def square_map(free: NDArray[np.bool_], size: int) -> NDArray[np.bool_]:

@@ -14,6 +14,7 @@ from ..common.validation import require_torch, truth_value, whole_number
 from ..errors import ModelError, TaskError, show
 from ..maps.checks import check_grid
 from ..maps.grid_map import GridMap
+from ..maps.grid_search import prepare_search
 from ..networks.config import MAX_IMAGE_SIZE
 from ..sampling.heatmap import Heatmap
 from .model_files import find_model, load_script, read_model
@@ -66,6 +67,7 @@ def load_model(path: str | PathLike[str] | None = None) -> Predictor:
     try:
         predictor = Predictor(load_script(model.script), model.record)
         predictor.warm_up()
+        prepare_search(with_costs=True)  # for regions that have to be connected
     except ModelError as error:
         is_damaged = error.__cause__ is None or not is_out_of_memory(error.__cause__)
         hint = "; copy or export it again" if is_damaged else ""
