@@ -157,10 +157,7 @@ def read_record(path: Path) -> dict[str, Any]:
 
 
 def read_script(path: Path) -> bytes:
-    """Read any TorchScript file, and check the length of each of its tensors.
-
-    Returns:
-        Its archive, without what torch does not need.
+    """Return the archive of any TorchScript file, after a check of the length of each tensor.
 
     Raises:
         ModelError: the file is missing, no TorchScript file, or damaged.

@@ -8,7 +8,12 @@ from helpers.tiny_model import TINY
 torch = pytest.importorskip("torch")
 
 from cbagan_ompl import ModelError
-from cbagan_ompl.training.checkpoints import SCHEMA, load_checkpoint, save_checkpoint
+from cbagan_ompl.training.checkpoints import (
+    SCHEMA,
+    best_generator,
+    load_checkpoint,
+    save_checkpoint,
+)
 from cbagan_ompl.training.loop import train
 from cbagan_ompl.training.task_sources import DatasetSource
 
@@ -42,3 +47,18 @@ def test_weights_without_a_schema(tmp_path: Path) -> None:
 def test_a_checkpoint_that_cannot_be_written(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match="cannot write"):
         save_checkpoint({"schema": SCHEMA}, tmp_path / "none" / "last.pt")
+
+
+@pytest.mark.parametrize("decay", [0.0, 0.5])
+def test_what_is_exported_is_what_was_validated(
+    source: DatasetSource, tmp_path: Path, decay: float
+) -> None:
+    config = TINY.updated({"epochs": 1, "ema_decay": decay})
+    state = load_checkpoint(
+        train(source, config, tmp_path, device="cpu", progress=False)["checkpoint"]
+    )
+    wanted, other = ("average", "generator") if decay else ("generator", "average")
+    state["gan"][other] = {}
+    weights = best_generator(state).state_dict()
+    for name, value in state["gan"][wanted].items():
+        assert torch.equal(weights[name], value)
