@@ -75,8 +75,9 @@ class RobotMotionValidator(ob.MotionValidator):  # type: ignore[misc]
     Straight motions of RealVectorStateSpace and SE2StateSpace, and the curves of DubinsStateSpace
     and ReedsSheppStateSpace, as OMPL interpolates them. No step width: a collision is never
     missed. A motion along which the robot comes nearer to an obstacle than
-    :data:`cbagan_ompl.robots.shape_checker.CONSERVATISM` pixels may be refused; straight motions
-    without a turn are exact.
+    :data:`cbagan_ompl.robots.pieces.CONSERVATISM` pixels may be refused; straight motions
+    without a turn are exact. Where numba is installed it compiles the check of straight motions,
+    which takes seconds once and is kept on disk.
 
     Args:
         si: as for :class:`RobotValidityChecker`.
@@ -108,6 +109,8 @@ class RobotMotionValidator(ob.MotionValidator):  # type: ignore[misc]
         super().__init__(si)
         self._checker = checker
         self._curvature = _largest_curvature(pose_space(self._space))
+        if self._curvature is None:
+            checker.compile()
         # States of its own: one for poses on the way of a curve, one for the end of a part.
         self._middle, self._part_end = (compat.new_state(self._space) for _ in range(2))
 
@@ -121,7 +124,10 @@ class RobotMotionValidator(ob.MotionValidator):  # type: ignore[misc]
                 to the last valid state (to within a thousandth of the motion) and how far along
                 the motion it is.
         """
-        free = self._is_free(s1, s2, 1.0)
+        if self._curvature is None:
+            free = self._checker.straight_is_free(*self._read(s1), *self._read(s2))
+        else:
+            free = self._is_free(s1, s2, 1.0)
         if last_valid and not free:
             self._set_last_valid(last_valid[0], s1, s2)
         return free

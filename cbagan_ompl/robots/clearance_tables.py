@@ -16,6 +16,8 @@ Points = NDArray[np.float64]
 #: touches an obstacle; some may; from FREE on none does, and the shape may move
 #: ``(value - FREE) * STEP`` pixels in any direction without touching one.
 BLOCKED, UNKNOWN, FREE = 0, 1, 2
+#: From here on the shape is at least a STEP away from obstacles.
+CLEAR = FREE + 1
 #: Unit of the values of a table, in pixels.
 STEP = 0.25
 
@@ -30,7 +32,7 @@ _TURN, _TURN_FRACTION = 0.35, 0.05
 _ROUNDING = 1e-6
 
 # A table takes as long to make as about so many exact checks.
-_USES = 40
+USES = 40
 
 # From the centre of a pixel to its corner.
 _HALF_DIAGONAL = 2**-0.5
@@ -61,11 +63,16 @@ class ClearanceTables:
         blocked = centres <= (shape.inscribed - (_HALF_DIAGONAL - 0.5) if shape.inscribed else 0.0)
         any_heading = _quantize(distances - shape.radius, free)
         any_heading[blocked] = BLOCKED
-        self._any_heading = any_heading.tobytes()
-        #: The tables by range of headings, four full turns of them so that sums of headings need
-        #: no reduction.
-        self.by_heading = [self._any_heading] * (4 * self.count)
-        self._uses = [0] * self.count
+        # Memory is taken up only by the tables that are made: the first one for all headings, then
+        # one for each range of them.
+        self.stack = np.empty((self.count + 1, free.size), np.uint8)
+        self.stack[0] = any_heading.reshape(-1)
+        #: The row of the stack for each range of headings, over four full turns, so that sums of
+        #: headings need no reduction; then how often the table of each range did not know.
+        self.counts = np.zeros(5 * self.count, np.int64)
+        self.slots, self.uses = self.counts[: 4 * self.count], self.counts[4 * self.count :]
+        #: The tables in the order of the slots.
+        self.by_heading = [memoryview(self.stack[0])] * (4 * self.count)
 
     def refine(self, index: int) -> bool:
         """Note that a table did not know; return whether a better one has taken its place.
@@ -77,21 +84,21 @@ class ClearanceTables:
             index: of the range, as in ``by_heading``.
         """
         index %= self.count
-        self._uses[index] += 1
-        if self._uses[index] != _USES:
+        self.uses[index] += 1
+        if self.uses[index] != USES:
             return False
-        table = self._make(index)
-        for turn in range(4):
-            self.by_heading[turn * self.count + index] = table
+        self.make(index)
         return True
 
-    def make_all(self) -> None:
-        """Make the tables of all headings now."""
-        for index in range(self.count):
-            self._uses[index] = _USES - 1
-            self.refine(index)
+    def make(self, index: int) -> None:
+        """Make the table of a range of headings."""
+        self.stack[index + 1] = self._make(index)
+        table = memoryview(self.stack[index + 1])
+        for turn in range(4):
+            self.slots[turn * self.count + index] = index + 1
+            self.by_heading[turn * self.count + index] = table
 
-    def _make(self, index: int) -> bytes:
+    def _make(self, index: int) -> NDArray[np.uint8]:
         half = pi / self.count if self._shape.turns else 0.0
         values, certain = [], []
         for part in self._shape.parts:
@@ -99,7 +106,7 @@ class ClearanceTables:
             values.append(self._distances.erode(touched))
             certain.append(self._free.erode(inside))
         # What the shape covers for certain blocks it; free is marked by 255.
-        return bytes(np.minimum.reduce([*values, *certain]).tobytes())
+        return np.asarray(np.minimum.reduce([*values, *certain])).reshape(-1)
 
 
 class _RowErosion:

@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from math import cos, hypot, pi, sin
+from typing import Any
+
+import numpy as np
 
 from ..maps.grid_map import GridMap
 from .clearance import ShapeClearance
-from .clearance_tables import BLOCKED, FREE, STEP, UNKNOWN, ClearanceTables
+from .clearance_tables import BLOCKED, CLEAR, STEP, UNKNOWN, ClearanceTables
+from .pieces import CONSERVATISM, WORTH_A_TEST, pieces_are_free
 from .pixel_shape import PixelShape, pixel_shape
 from .robot import Robot
 from .row_runs import Region, region_is_free, row_runs
@@ -18,17 +22,14 @@ Pose = tuple[float, float, float]
 #: The pose of a motion at a parameter from 0 to 1.
 PoseAt = Callable[[float], Pose]
 
-#: A motion may be refused where the shape comes nearer to an obstacle than this, in pixels.
-CONSERVATISM = 0.25
-
 _TURN = 2 * pi
+
+# A table is worth its time after more uses where exact tests are compiled.
+_COMPILED_USES = 500.0
 
 # What only touches the edge of a pixel touches the pixel, and the rounding of a coordinate must
 # not hide it: a margin of the shape, in pixels. Points have none, see `region_is_free`.
 _ROUNDING = 1e-9
-
-# Hulls and margins that are larger than the shape by more than this are not tried, in pixels.
-_WORTH_A_TEST = 1.5
 
 # Least movement between two looks at a motion where the tables do not know, in pixels.
 _LOOK = 1.0
@@ -67,6 +68,8 @@ class ShapeChecker:
         self._parts = [part.tolist() for part in self.shape.parts]
         self._rounding = 0.0 if len(self._parts[0]) == 1 else _ROUNDING
         self._per_radian = self.tables.count / _TURN
+        self._compiled: Callable[..., int] | None = None
+        self._buffers: tuple[Any, ...] = ()
         self._clearance = ShapeClearance(grid.free, self.shape)
 
     @classmethod
@@ -82,6 +85,21 @@ class ShapeChecker:
         checker = cls(grid, robot)
         _KEPT.append(checker)
         return checker
+
+    def compile(self) -> bool:
+        """Let numba compile the check of straight motions; return False without numba.
+
+        The first time takes seconds; the result is kept on disk, and later processes load it.
+        Answers do not change.
+        """
+        if self._compiled is None:
+            try:
+                from .compiled import straight_is_free
+            except ImportError:
+                return False
+            self._buffers = self._make_buffers()
+            self._compiled = straight_is_free
+        return True
 
     def pose_is_free(self, x: float, y: float, yaw: float) -> bool:
         """Return whether the robot at a pose touches nothing; world coordinates."""
@@ -108,6 +126,11 @@ class ShapeChecker:
         The position moves on a line and the heading turns the short way, both evenly, as in
         OMPL's SE2StateSpace.
         """
+        if self._compiled is not None:
+            answer = self._compiled(x0, y0, yaw0, x1, y1, yaw1, *self._buffers)
+            if answer > 1:
+                self.tables.make(answer // 2 - 1)
+            return answer & 1 == 1
         a, b, c, d, e, f = self._affine
         u, v = a * x0 + b * y0 + c, d * x0 + e * y0 + f
         du, dv = a * (x1 - x0) + b * (y1 - y0), d * (x1 - x0) + e * (y1 - y0)
@@ -119,6 +142,9 @@ class ShapeChecker:
             if not -pi <= turn <= pi:
                 turn = (turn + pi) % _TURN - pi
             turn *= sign
+
+        if not self.shape.turns:
+            heading = 0.0
 
         def pose_at(t: float) -> Pose:
             return u + t * du, v + t * dv, heading + t * turn
@@ -168,6 +194,23 @@ class ShapeChecker:
         heading = self.shape.sign * yaw + self.shape.phase
         return self._clearance(u, v, heading) * self.grid.resolution
 
+    def _make_buffers(self) -> tuple[Any, ...]:
+        """Return all arguments of the compiled check but the motion."""
+        shape, tables = self.shape, self.tables
+        height, width = self.grid.shape
+        # A copy, since what numba compiles takes no read-only arrays.
+        runs = np.frombuffer(self._runs.lengths, np.uint16).reshape(height, width).copy()
+        counts = [len(part) for part in shape.parts]
+        constants = (
+            *(shape.radius, shape.diameter, self._per_radian, _LOOK, WORTH_A_TEST, CONSERVATISM),
+            *(self._rounding, _COMPILED_USES, float(shape.turns), shape.sign, shape.phase),
+            *self._affine,
+        )
+        scratch = np.zeros((9, max(32, height + 2, 2 * max(counts))))
+        scratch[8, : len(constants)] = constants
+        starts = np.cumsum([0, *counts])
+        return tables.stack, tables.counts, runs, np.concatenate(shape.parts), starts, scratch
+
     def _march(self, pose_at: PoseAt, movement: float) -> list[tuple[float, float]] | None:
         """Return the parts of a motion that tables do not decide; None where it collides.
 
@@ -196,12 +239,13 @@ class ShapeChecker:
                 value = by_heading[index][int(v) * width + int(u)]
             if value == BLOCKED:
                 return None
-            reach = (value - FREE) * per_value
+            # Over the reach the shape keeps a unit of the tables away from obstacles.
+            reach = (value - CLEAR) * per_value
             if t == 1.0:
                 # The end is looked at first, since motions often fail there.
-                end, t = (1.0 - reach if value > FREE else 1.0), 0.0
+                end, t = (1.0 - reach if value > CLEAR else 1.0), 0.0
                 continue
-            if value > FREE:
+            if value > CLEAR:
                 if t - reach > done:
                     gaps.append((done, t - reach))
                 done = t = t + reach
@@ -213,44 +257,37 @@ class ShapeChecker:
                 return gaps
 
     def _straight_gap_is_free(self, pose_at: PoseAt, turn: float, low: float, high: float) -> bool:
-        """Return whether a piece of a straight motion is free; the whole turns by ``turn``."""
+        """Return whether a part of a straight motion is free; the whole turns by ``turn``."""
         radius, diameter = self.shape.radius, self.shape.diameter
-        pieces = [(low, high)]
-        while pieces:
-            low, high = pieces.pop()
-            angle = turn * (high - low)
-            # A point of the shape leaves the line between its places at both ends by no more than
-            # the margin. The hull holds more than what the shape passes over by no more than the
-            # excess: it lets each point of the shape turn as any other does.
-            margin = radius * angle * angle / 8
-            excess = diameter * angle / 4 + 3 * margin
-            if excess <= _WORTH_A_TEST and self._swept_is_free(
-                pose_at(low), pose_at(high), margin + self._rounding
-            ):
-                continue
-            if excess <= CONSERVATISM:
-                return False
-            middle = (low + high) / 2
-            pieces += [(middle, high), (low, middle)]
-        return True
+
+        def margin_of(width: float) -> float:
+            # A point of the shape leaves the line between its places at both ends by an eighth at
+            # most. With a sixth, what is added to both halves lies in what is added to the whole.
+            return radius * (turn * width) ** 2 / 6
+
+        def excess_of(width: float) -> float:
+            # The hull of both ends lets each point of the shape turn as any other does.
+            return diameter * turn * width / 4 + 3 * margin_of(width)
+
+        def is_free(start: float, end: float) -> bool:
+            margin = margin_of(end - start) + self._rounding
+            return self._swept_is_free(pose_at(start), pose_at(end), margin)
+
+        return pieces_are_free(low, high, excess_of, is_free)
 
     def _curve_gap_is_free(self, pose_at: PoseAt, movement: float, low: float, high: float) -> bool:
-        """Return whether a piece of a curve is free."""
-        pieces = [(low, high)]
-        while pieces:
-            low, high = pieces.pop()
-            middle = (low + high) / 2
-            # No point of the shape is farther than this from where it is in the middle.
-            margin = movement * (high - low) / 2
-            if margin <= _WORTH_A_TEST and self._swept_is_free(
-                pose_at(middle), None, margin + self._rounding
-            ):
-                continue
-            # The margin is taken along both axes, so it is greater diagonally.
-            if margin * 2**0.5 <= CONSERVATISM:
-                return False
-            pieces += [(middle, high), (low, middle)]
-        return True
+        """Return whether a part of a curve is free."""
+
+        def excess_of(width: float) -> float:
+            # Of the margin below, which is taken along both axes and so is greater diagonally.
+            return movement * width / 2**0.5
+
+        def is_free(start: float, end: float) -> bool:
+            # No point of the shape is farther than the margin from where it is in the middle.
+            margin = movement * (end - start) / 2 + self._rounding
+            return self._swept_is_free(pose_at((start + end) / 2), None, margin)
+
+        return pieces_are_free(low, high, excess_of, is_free)
 
     def _swept_is_free(self, start: Pose, end: Pose | None, margin: float) -> bool:
         """Return whether the hulls of the parts at one or two poses touch nothing.
