@@ -12,6 +12,8 @@ bounds, sees the true ones. A solve that ends for lack of time leaves them as th
 
 The goal is asked once its tree has four nodes. To have them soon, the first step of the goal's
 tree is taken in three short ones. Until then samples are OMPL's own, but for the first one.
+
+Headings have no bounds to set: those of poses are OMPL's own, uniform.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ from ..errors import PlannerError
 from ..sampling.sampler import HeatmapSampler
 from .compat import ob, planner_data
 from .monitor import PlannerMonitor
-from .states import StateAccess
+from .states import StateAccess, pose_space
 
 # Nodes of the goal's tree from which on RRTConnect asks for further goal states in each iteration.
 _ASKING_SIZE = 4
@@ -88,12 +90,13 @@ class BoundsSteering:
     def __init__(
         self, space: Any, states: StateAccess, sampler: HeatmapSampler, monitor: SteeringMonitor
     ) -> None:
-        self._space = space
+        poses = pose_space(space)
+        self._space = space if poses is None else poses  # which has the bounds of the positions
         self._read = states.read
         self._sampler = sampler
         self._monitor = monitor
         self._point = ob.RealVectorBounds(2)
-        self._true = _copy_bounds(space.getBounds())
+        self._true = _copy_bounds(self._space.getBounds())
         self._is_steered = False
         # Whether the goal has just been asked, and whether a goal state has just been sampled.
         self._was_asked = self._goal_sampled = False

@@ -18,6 +18,7 @@ from cbagan_ompl import (
     HeatmapValidStateSampler,
     PlannerError,
     attach,
+    reached_planners,
 )
 from cbagan_ompl.planning import compat
 from cbagan_ompl.planning.compat import ob, og, ou
@@ -150,7 +151,7 @@ def test_without_headings_they_are_uniform(
 @pytest.mark.parametrize("kind", SPACES)
 @pytest.mark.parametrize("planner", ["RRT", "RRTstar", "BKPIECE1", "RRTConnect"])
 def test_attached(kind: str, planner: str, two_walls: GridMap, corridor: Heatmap) -> None:
-    if planner == "RRTConnect" and not compat.HAS_STATE_SAMPLER_ALLOCATOR:
+    if planner not in reached_planners():
         pytest.skip("not reached by this build")
     if planner == "BKPIECE1" and kind == "compound":
         pytest.skip("the space has no projection")
