@@ -3,10 +3,10 @@
     python benchmarks/studies/robot_checks.py --map bundled:rooms --map bundled:maze \
         --paths 2000 --json robot_checks.json
 
-Speed: the mean CPU time of RobotMotionValidator in SE(2) for a 12 x 6 pixel rectangle, as a multiple
-of GridMotionValidator's for a point on the same motions, interleaved. Tables: CPU time and memory for
-all headings of a map of 1024 x 1024 pixels. Paths: planners solve random tasks on small random maps,
-and every path is looked at each tenth of a pixel with shapely, polygon against pixels.
+Speed: the mean CPU time of RobotMotionValidator in SE(2) for a 12 x 6 pixel rectangle, as a
+multiple of GridMotionValidator's for a point on the same motions, interleaved. Tables: CPU time and
+memory for all headings of a map of 1024 x 1024 pixels. Paths: planners solve random tasks on small
+random maps, and every path is looked at each tenth of a pixel with shapely, polygon against pixels.
 """
 
 from __future__ import annotations
