@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import pairwise
 from math import inf, pi
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -248,6 +249,31 @@ def test_the_last_valid_state_of_ompl_1() -> None:
     assert not validator.checkMotion(make(10, 20, 0), make(90, 20, 0), LastValid)
     assert pytest.approx(45 / 80, abs=2e-3) == LastValid.second
     assert LastValid.first.getX() == pytest.approx(55, abs=0.2)
+
+
+@pytest.mark.parametrize("space_name", ["Dubins", "Reeds-Shepp"])
+def test_the_curve_to_the_last_valid_state_touches_nothing(space_name: str) -> None:
+    """It may be another curve than the part of the motion that was checked."""
+    grid, robot = make_map(1), ROBOTS["car"]
+    space = with_bounds(SPACES[space_name](), grid)
+    validator = RobotMotionValidator(ob.SpaceInformation(space), grid, robot)
+    dense, rng = DenseCheck(grid, robot), np.random.default_rng(2)
+    make, poses = States(space), random_poses(grid, rng)
+    moved = 0
+    for _ in range(300):
+        start, end = next(poses), next(poses)
+        if dense.collides(start[None]).any():
+            continue
+        pair = SimpleNamespace(first=make(0, 0, 0), second=-1.0)
+        first = make(*start)
+        if validator.checkMotion(first, make(*end), pair):
+            continue
+        assert 0 <= pair.second < 1
+        moved += pair.second > 0
+        length = space.distance(first, pair.first)
+        steps = steps_of(grid, robot, length, length / 6.0)
+        assert not dense.collides(poses_between(space, first, pair.first, steps)).any()
+    assert moved > 20
 
 
 def test_arguments_that_are_none() -> None:
