@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from .errors import (
     CbaganOmplError,
     CbaganOmplWarning,
+    ClusterError,
     ConfigError,
     DatasetError,
     HeatmapError,
@@ -57,6 +58,7 @@ __all__ = [
     "Attachment",
     "CbaganOmplError",
     "CbaganOmplWarning",
+    "ClusterError",
     "ConfigError",
     "DatasetError",
     "GridMap",

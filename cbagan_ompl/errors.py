@@ -75,6 +75,10 @@ class ConfigError(CbaganOmplError):
     """An option with a value that makes no sense, or an unknown option."""
 
 
+class ClusterError(CbaganOmplError):
+    """A cluster that cannot be reached, or whose workers cannot do the work."""
+
+
 class MissingDependencyError(CbaganOmplError):
     """An optional package that the called function needs is not installed."""
 

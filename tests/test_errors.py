@@ -23,7 +23,7 @@ CLASSES = [
 
 
 def test_every_class_has_one_root_and_is_public() -> None:
-    assert len(CLASSES) == 10
+    assert len(CLASSES) == 11
     for one in CLASSES:
         assert issubclass(one, CbaganOmplError)
         assert getattr(cbagan_ompl, one.__name__) is one

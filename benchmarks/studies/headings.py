@@ -44,6 +44,7 @@ from cbagan_ompl import (
 from cbagan_ompl.common.files import write_json
 from cbagan_ompl.map_generators import MAP_GENERATORS
 from cbagan_ompl.maps.grid_search import shortest_path
+from cbagan_ompl.maps.tasks import load_tasks
 from cbagan_ompl.planning import compat
 from cbagan_ompl.robots.shape_checker import ShapeChecker
 
@@ -54,8 +55,7 @@ SPACES = {
     "Dubins 5": {"turning_radius": 5.0},
     "Reeds-Shepp 10": {"turning_radius": 10.0, "reverse": True},
 }
-# Maps on which the way is not straight. They are generated at half their size and enlarged, so
-# that the robot fits through.
+# Maps on which the way is not straight, generated at half their size and enlarged for the robot.
 GENERATORS = (
     "bug_trap",
     "caves",
@@ -69,7 +69,7 @@ GENERATORS = (
     "walls_with_gaps",
     "warehouse",
 )
-SIDE, WIDE, SHORTEST, DETOUR = 256, 5.0, 220.0, 1.3
+SIDE, WIDE, SHORTEST, DETOUR = 256, 4.0, 300.0, 1.5
 POSITIONS_ONLY = HeadingSpread(uniform_fraction=1)
 WAYS: dict[str, HeadingSpread | None] = {
     "OMPL's own": None,
@@ -92,6 +92,7 @@ class PoseTask:
     grid: GridMap
     start: tuple[float, float, float]
     goal: tuple[float, float, float]
+    length: float
 
 
 def main() -> None:
@@ -266,15 +267,17 @@ def generated_tasks(count: int) -> Iterator[PoseTask]:
 
 
 def file_tasks(args: argparse.Namespace) -> Iterator[PoseTask]:
-    """Yield the first few tasks on each map that the robot can begin and end."""
+    """Yield the few tasks on each map that are the longest for the robot."""
     for word in args.maps:
         grid = GridMap.load(word)
-        found = 0
-        for task in tasks_of(args.tasks or word, grid):
-            pose = pose_task(f"{grid.name}-{found}", grid, grid, task.start, task.goal, 0.0)
-            if pose is not None and found < args.tasks_per_map:
-                found += 1
-                yield pose
+        inflated = grid.inflated(WIDTH / 2)
+        tasks = load_tasks(args.tasks, grid) if args.tasks else tasks_of(word, grid)
+        poses = [
+            pose_task(f"{grid.name}-{number}", grid, inflated, task.start, task.goal, 0.0)
+            for number, task in enumerate(tasks)
+        ]
+        fitting = [task for task in poses if task is not None]
+        yield from sorted(fitting, key=lambda task: -task.length)[: args.tasks_per_map]
 
 
 def pose_task(
@@ -282,10 +285,12 @@ def pose_task(
 ) -> PoseTask | None:
     """Return a task with the yaws of the shortest path at its ends; None if the robot collides."""
     ends = [tuple(map(int, grid.to_pixel(point))) for point in (start, goal)]
-    path = shortest_path(wide.free, *ends)
-    if path is None or np.hypot(*np.diff(path, axis=0).T).sum() < max(
-        shortest, DETOUR * np.hypot(*(path[-1] - path[0])) * (shortest > 0)
-    ):
+    fits = wide.is_free(np.array((start, goal))).all()
+    path = shortest_path(wide.free, *ends) if fits else None
+    if path is None:
+        return None
+    length = float(np.hypot(*np.diff(path, axis=0).T).sum())
+    if shortest and length < max(shortest, DETOUR * np.hypot(*(path[-1] - path[0]))):
         return None
     reach = min(12, len(path) - 1)
     checker = ShapeChecker.of(grid, Robot.rectangle(LENGTH, WIDTH))
@@ -294,11 +299,12 @@ def pose_task(
         # Where the robot does not fit that way round, the nearest heading in which it does.
         turns = [0.0, *(s * k * pi / 12 for k in range(1, 6) for s in (1, -1))]
         x, y, yaw = float(point[0]), float(point[1]), atan2(dv, du)
-        fits = [yaw + turn for turn in turns if checker.pose_is_free(x, y, yaw + turn)]
-        if not fits:
+        free = [yaw + turn for turn in turns if checker.pose_is_free(x, y, yaw + turn)]
+        if not free:
             return None
-        poses.append((x, y, fits[0]))
-    return PoseTask(name, grid, *poses)
+        # A yaw of pi is out of OMPL's bounds.
+        poses.append((x, y, (free[0] + pi) % (2 * pi) - pi))
+    return PoseTask(name, grid, *poses, length)
 
 
 def summarise(done: list[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -18,7 +18,7 @@ from ..common.parallel import fork_server, start_first, why_died
 from ..common.signals import interrupts_held
 from ..common.text import one_line
 from ..errors import ConfigError
-from ..planning.heatmap_sources import LEARNED
+from ..planning.heatmap_sources import AUTO, LEARNED
 from .worker import Job, UnwritableLogError, run_job
 
 # Imported once, by the server from which the processes are forked.
@@ -118,7 +118,7 @@ class _RunningJob:
     """
 
     def __init__(self, job: Job, folder: Path) -> None:
-        learned = LEARNED in job.settings.samplers or job.settings.models
+        learned = {LEARNED, AUTO} & set(job.settings.samplers) or job.settings.models
         context = fork_server([*_PRELOAD, *(_PRELOAD_LEARNED if learned else ())])
         self.job = job
         self.rounds_left = job.settings.runs

@@ -94,8 +94,11 @@ def select_tasks(
     for path in maps or [BUNDLED + name for name in bundled_maps()]:
         loaded = GridMap.load(path, **(map_options or {}))
         # By the name of the file: that of an inflated map says so.
-        given = tasks_of(path, loaded) if tasks is None else load_tasks(tasks, loaded)
         workspace = Workspace(loaded, robot or Robot.point())
+        if tasks is None:
+            given = tasks_of(path, loaded, with_yaw=workspace.robot.has_heading)
+        else:
+            given = load_tasks(tasks, loaded)
         if not given:
             given = random_tasks(workspace, tasks_per_map or _RANDOM_TASKS, seed)
         for number in _spread(len(given), tasks_per_map):

@@ -10,7 +10,14 @@ from zlib import crc32
 from ..common.files import write_atomically
 from ..common.text import one_line
 from ..errors import ConfigError, show
-from ..planning.heatmap_sources import LEARNED, SAMPLERS, HeatmapSource, heatmap_source
+from ..planning.heatmap_sources import (
+    LEARNED,
+    SAMPLERS,
+    HeatmapSource,
+    heatmap_source,
+    is_auto,
+    resolve_auto,
+)
 from ..planning.ompl_benchmark import PlannerVariant, RunOptions, check_variants, run_benchmark
 from ..sampling.heatmap import Heatmap
 from .logs import GEOMETRIC, ExperimentLog, concatenate_logs, format_log, parse_log
@@ -163,6 +170,9 @@ def _source(job: Job, sampler: str) -> HeatmapSource | None:
     model = job.settings.models.get(sampler)
     if model is not None and sampler in set(SAMPLERS) - {LEARNED}:
         raise ConfigError(f"a model cannot be called {sampler}, this is another sampler's name")
+    if is_auto(sampler):
+        sampler = resolve_auto(job.task.grid)
+        model = job.settings.models.get(sampler)
     return heatmap_source(sampler if model is None else LEARNED, model)[1]
 
 

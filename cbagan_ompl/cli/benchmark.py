@@ -6,6 +6,7 @@ import argparse
 import os
 import shlex
 import sys
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +19,11 @@ from ..planning.heatmap_sources import LEARNED
 from .options import (
     add_map_options,
     add_sampler_options,
+    add_scheduler_option,
     describe_planners,
     describe_samplers,
     map_options,
+    open_executor,
     sampler_options,
 )
 from .robot_options import add_robot_options, robot_of
@@ -158,6 +161,7 @@ def add_benchmark_parser(commands: Any) -> None:
         metavar="N",
         help="tasks that run at a time, each in a process (default: the number of cores)",
     )
+    add_scheduler_option(effort)
 
     output = parser.add_argument_group("output")
     output.add_argument("--output", required=True, metavar="DIR", help="folder of the results")
@@ -220,10 +224,11 @@ def _settings(args: argparse.Namespace) -> Settings:
 
 def _benchmark(args: argparse.Namespace) -> int:
     from ..benchmarking.benchmark import Benchmark, write_results
+    from ..benchmarking.report import warn_of_hosts
     from ..benchmarking.tasks import select_tasks
 
     whole_number("jobs", args.jobs, 1, _MOST_JOBS)
-    if args.jobs > _cores():
+    if args.jobs > _cores() and args.scheduler is None:
         print(
             f"warning: {args.jobs} jobs share {_cores()} cores, all times will be too long",
             file=sys.stderr,
@@ -233,9 +238,13 @@ def _benchmark(args: argparse.Namespace) -> int:
         args.maps, args.tasks, args.tasks_per_map, settings.robot, args.seed, map_options(args)
     )
     benchmark = Benchmark(tasks, settings, Path(args.output), args.resume)
-    failures = benchmark.run(args.jobs)
+    with open_executor(args) as executor:
+        failures = benchmark.run(executor)
     logs = benchmark.finished_logs(failures)
     if logs:
         command = one_line(shlex.join(["cbagan-ompl", *sys.argv[1:]]), _LONGEST_COMMAND)
         print(write_results(logs, settings, failures, benchmark.folder, command))
+        said = warn_of_hosts(Counter(log.host for log in logs))
+        if said:
+            print(f"warning: {said}", file=sys.stderr)
     return 1 if failures else 0

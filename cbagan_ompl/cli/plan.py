@@ -8,8 +8,11 @@ from typing import Any
 from ..common.outputs import check_output, write_report
 from ..errors import ConfigError
 from ..maps.grid_map import GridMap
+from ..maps.grid_search import COMPILED
 from ..maps.loading import bundled_maps
 from ..maps.tasks import tasks_of
+from ..planning.heatmap_sources import CORRIDOR
+from ..robots.robot import Robot
 from ..sampling.heatmap import Heatmap
 from .inputs import input_files
 from .options import (
@@ -61,7 +64,13 @@ def _add_task(task: Any) -> None:
         metavar="X,Y[,YAW]",
         help="where the path begins; with a yaw, in radians, for robots with heading",
     )
-    task.add_argument("--goal", type=endpoint, metavar="X,Y[,YAW]", help="where it ends")
+    task.add_argument(
+        "--goal",
+        type=endpoint,
+        action="append",
+        metavar="X,Y[,YAW]",
+        help="where it ends; given several times, at whichever of them",
+    )
     task.add_argument(
         "--task",
         type=int,
@@ -137,7 +146,8 @@ def _plan(args: argparse.Namespace) -> int:
     for file in (args.output, args.csv):
         check_output(file, input_files(args), force=args.force)
     grid = GridMap.load(args.map, **map_options(args))
-    start, goal = _endpoints(args, grid)
+    robot = robot_of(args)
+    start, goal = _endpoints(args, grid, robot)
     result = plan(
         grid,
         start,
@@ -147,7 +157,7 @@ def _plan(args: argparse.Namespace) -> int:
         time=args.time,
         iterations=args.iterations,
         range=args.range,
-        robot=robot_of(args),
+        robot=robot,
         snap=args.snap,
         model=args.model,
         heatmap=None if args.heatmap is None else Heatmap.load(args.heatmap, grid),
@@ -169,13 +179,13 @@ def _plan(args: argparse.Namespace) -> int:
 
 
 def _endpoints(
-    args: argparse.Namespace, grid: GridMap
-) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    args: argparse.Namespace, grid: GridMap, robot: Robot
+) -> tuple[tuple[float, ...], tuple[float, ...] | list[tuple[float, ...]]]:
     if args.start is not None and args.goal is not None and args.task is None:
         return args.start, args.goal
     if args.start is not None or args.goal is not None:
         raise ConfigError("give both --start and --goal, or --task alone")
-    tasks = tasks_of(args.map, grid)
+    tasks = tasks_of(args.map, grid, with_yaw=robot.has_heading)
     number = args.task or 0
     if not 0 <= number < len(tasks):
         have = f"tasks 0 to {len(tasks) - 1}" if tasks else "no tasks of its own"
@@ -195,6 +205,7 @@ def _print_summary(values: dict[str, Any], figure: str | None) -> None:
         **{f"{role} moved": _describe_move(values, role) for role in values["snapped"]},
         "planner": f"{values['planner']}, OMPL {values['ompl_version']}",
         "sampler": f"{values['sampler']}, hook {values['hook'] or 'none'}",
+        **({"grid search": _describe_search(values)} if values["sampler"] == CORRIDOR else {}),
         "samples": _describe_samples(values),
         "nodes": values["nodes"],
         "inference": f"{values['inference_s']:.4f} s",
@@ -213,6 +224,12 @@ _SAMPLES = {
     "corridor": "from the corridor",
     "straight-line": "from the straight line",
 }
+
+
+def _describe_search(values: dict[str, Any]) -> str:
+    if values["grid_search"] == COMPILED:
+        return COMPILED
+    return f"{values['grid_search']}; a compiled one: pip install 'cbagan-ompl[search]'"
 
 
 def _describe_samples(values: dict[str, Any]) -> str:

@@ -13,6 +13,7 @@ from ..datasets.dataset import load_dataset
 from ..datasets.synthetic import HARD_DETOUR, TASKS_PER_MAP, SyntheticSettings
 from ..errors import ConfigError
 from ..networks.config import NETWORKS
+from ..training.checkpoint_files import read_checkpoint
 from ..training.config import LAST, PRESETS, TrainingConfig
 from ..training.task_sources import DatasetSource, SyntheticSchedule, TaskSource, synthetic_source
 
@@ -70,7 +71,8 @@ def add_train_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--start-from",
         metavar="FILE",
-        help="begin with the weights of another run's checkpoint, which this one refines",
+        help="begin with the weights of another run's checkpoint, or of an exported model: a file, "
+        "or the name of a bundled one such as cbagan-worlds",
     )
     _add_recipe_options(parser.add_argument_group("recipe, the later overrides the earlier"))
     _add_machine_options(parser.add_argument_group("machine"))
@@ -85,7 +87,8 @@ def _add_recipe_options(recipe: Any) -> None:
         "--preset",
         choices=sorted(PRESETS),
         default="best",
-        help="synthetic: what the bundled model was trained with, for images of 256 pixels; best: "
+        help="synthetic: what the bundled model was trained with, for images of 256 pixels; "
+        "refine: what --start-from cbagan-worlds goes on with; best: "
         "the best one for the paper's data; paper: the values of the paper (default: best)",
     )
     recipe.add_argument(
@@ -186,6 +189,8 @@ def _train(args: argparse.Namespace) -> int:
         whole_number("--threads", args.threads, 1, _MAX_THREADS)
     if args.synthetic == (args.dataset is not None):
         raise ConfigError("tasks come from a DATASET or from --synthetic: give one of both")
+    if args.start_from is not None:
+        read_checkpoint(Path(args.start_from))
     require_torch()
     import torch
 
@@ -250,6 +255,7 @@ def _print_scores(result: dict[str, Any]) -> None:
 
 
 def _export(args: argparse.Namespace) -> int:
+    read_checkpoint(Path(args.checkpoint))
     require_torch()
     from ..training.export import export
 

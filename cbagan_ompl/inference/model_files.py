@@ -192,6 +192,14 @@ def read_model(path: Path) -> ModelFile:
         return ModelFile(record, _checked_script(archive), is_listed)
 
 
+def is_model(path: Path) -> bool:
+    """Return whether a file is an exported model, perhaps a damaged one."""
+    try:
+        return RECORD_MEMBER in Archive(read_bytes(path, ModelError, MAX_MODEL_BYTES)).sizes
+    except Exception:  # zipfile lets many types through
+        return False
+
+
 def read_record(path: Path) -> dict[str, Any]:
     """Return what an exported model says about itself; errors as for :func:`read_model`."""
     return read_model(path).record

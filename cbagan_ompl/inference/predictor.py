@@ -14,6 +14,7 @@ from ..common.validation import require_torch, truth_value, whole_number
 from ..errors import ModelError, TaskError, show
 from ..maps.checks import check_grid
 from ..maps.grid_map import GridMap
+from ..maps.grid_search import prepare_search
 from ..networks.config import MAX_IMAGE_SIZE
 from ..sampling.heatmap import Heatmap
 from .model_files import find_model, load_script, read_model
@@ -66,6 +67,7 @@ def load_model(path: str | PathLike[str] | None = None) -> Predictor:
     try:
         predictor = Predictor(load_script(model.script), model.record)
         predictor.warm_up()
+        prepare_search(with_costs=True)  # for regions that have to be connected
     except ModelError as error:
         is_damaged = error.__cause__ is None or not is_out_of_memory(error.__cause__)
         hint = "; copy or export it again" if is_damaged else ""
@@ -84,6 +86,7 @@ class Predictor:
     """An exported model, ready to predict.
 
     Attributes:
+        module: the TorchScript module.
         record: what the model file says about itself: ``working_size``, ``metrics``, ``recipe``...
         inference_threads: CPU threads for one prediction. More than one rarely helps at the
             working size, and takes ten times as long where other work has the cores.
@@ -111,7 +114,7 @@ class Predictor:
                 f"{show(record)}; load_model makes one from a file"
             )
         whole_number("working_size", record.get("working_size", 0), 1, MAX_IMAGE_SIZE)
-        self._module = module
+        self.module = module
         self.record = record
         self.inference_threads = 1
 
@@ -234,7 +237,7 @@ class Predictor:
             ),
             own_torch_state(self.inference_threads),
         ):
-            values = self._module(cells, *endpoints)
+            values = self.module(cells, *endpoints)
             result: NDArray[np.float32] = values[:, 0].numpy()
         return result
 

@@ -187,12 +187,12 @@ def check_position(grid: GridMap, role: str, point: ArrayLike) -> NDArray[np.flo
 def _describe_blocked(grid: GridMap, position: NDArray[np.float64]) -> str:
     """Return what is at a blocked position: a wall, the margin around one, or unknown space."""
     column, row = np.floor(grid.to_pixel(position)).astype(int).tolist()
-    bare = grid.bare
-    if bare is not grid and bare.free[row, column]:
-        return f"too close to an obstacle of {bare.name} for the robot's radius"
-    if bare.unknown is not None and bare.unknown[row, column]:
-        return f"in unknown space of {bare.name}"
-    return f"in an obstacle of {bare.name}"
+    name, was_free = grid.bare
+    if was_free[row, column]:
+        return f"too close to an obstacle of {name} for the robot's radius"
+    if grid.unknown is not None and grid.unknown[row, column]:
+        return f"in unknown space of {name}"
+    return f"in an obstacle of {name}"
 
 
 def _format(point: NDArray[np.float64]) -> str:

@@ -86,7 +86,7 @@ def load_tasks(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
     raise MapError(f"{file}: unknown kind of task file; known are .scen and .csv")
 
 
-def tasks_of(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
+def tasks_of(path: str | os.PathLike[str], grid: GridMap, *, with_yaw: bool = False) -> list[Task]:
     """Return the tasks that come with a map.
 
     These are those of the package for ``bundled:NAME``, and those in ``NAME.map.scen`` or
@@ -95,6 +95,8 @@ def tasks_of(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
     Args:
         path: what the map was loaded from.
         grid: the map.
+        with_yaw: return tasks for robots with heading. Those of the bundled maps are for a car of
+            8 x 4 pixels that drives backwards too, with a turning radius of 6 pixels.
 
     Returns:
         The tasks, none for other maps.
@@ -110,8 +112,11 @@ def tasks_of(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
     check_grid(grid)
     file = as_path(path, MapError)
     if str(path).startswith(BUNDLED):
-        with resources.as_file(bundled_folder() / "tasks.csv") as tasks:
+        name = "car_tasks.csv" if with_yaw else "tasks.csv"
+        with resources.as_file(bundled_folder() / name) as tasks:
             return load_tasks(tasks, grid)
+    if with_yaw:
+        return []
     files = task_files(file)
     return load_tasks(files[0], grid) if files else []
 

@@ -8,29 +8,37 @@ from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Any
 
-from ..errors import PlannerError, show
+from ..errors import PlannerError
 from ..sampling.adaptation import AdaptiveMixture
+from ..sampling.budget import EARNED_BY_UNIFORM_UNSEEN, LearnedBudget
 from ..sampling.checks import check_heatmap
 from ..sampling.headings import HeadingSampler
 from ..sampling.heatmap import Heatmap
 from ..sampling.options import OPTIMIZING_SHARPNESS, SamplerOptions
+from ..sampling.roadmap import RoadmapMixture
 from ..sampling.sampler import HeatmapSampler
 from . import compat, ompl_samplers
-from .compat import ob, og, ou
+from .attachable import check_task, planner_of, setup_of
+from .bounds_steering import SteeringMonitor
+from .compat import ou
 from .goal_injection import InjectedGoal
 from .goal_monitor import GoalMonitor, goal_monitor
 from .hooks import (
+    BOUNDS_STEERING,
     GOAL_INJECTION,
     STATE_SAMPLER,
     VALID_STATE_SAMPLER,
     class_name,
     hook_of,
     keeps_sampler,
+    samples_are_nodes,
     stops_at_first,
+    wants_sharp,
 )
-from .monitor import PlannerMonitor, is_informed, is_monitored, release_forgotten
+from .monitor import PlannerMonitor, is_informed, release_forgotten
 from .pose_headings import with_headings
 from .states import StateAccess, drives_backwards, position_bounds, state_access
+from .steered_callbacks import install_steering
 
 # OMPL's range of a planner that was given none, as a fraction of the extent of the space.
 _OMPL_RANGE = 0.2
@@ -123,24 +131,27 @@ class Attachment:
 def attach(
     setup: Any, heatmap: Heatmap, options: SamplerOptions | None = None, **changes: Any
 ) -> Attachment:
-    """Make the planner of a SimpleSetup sample a heat map.
+    """Make a planner sample a heat map.
 
     Call it after ``setup.setPlanner(...)`` and after the planner's options, the start and the
     goal were set. What the planner has done so far is cleared, because samplers that it has made
     go only with its tree. Its options stay as they are but for what the hook needs: the goal bias
     under goal injection, and for informed sampling under a StateSampler, rejection instead of
-    direct sampling. For another start or goal: detach, set it, attach again. Planners other than
-    the attached one get the goal itself, also while it is attached. Until
-    :meth:`Attachment.detach` the setup, the planner and the heat map keep each other alive; where
-    nothing else refers to them any more, they are let go by the next ``attach`` or by Python's
-    garbage collector. That does not see references through OMPL: if a validity checker refers to
-    its own setup, or an attribute of the setup to the attachment, only ``detach`` lets go of them.
+    direct sampling. For another start or goal: detach, set it, attach again; a solve of a setup
+    whose goal was replaced meanwhile raises an error. Planners other than the attached one get the
+    goal itself, also while it is attached. Until :meth:`Attachment.detach` the setup, the planner
+    and the heat map keep each other alive; where nothing else refers to them any more, they are let
+    go by the next ``attach`` or by Python's garbage collector. That does not see references through
+    OMPL: if a validity checker refers to its own setup, or an attribute of the setup to the
+    attachment, only ``detach`` lets go of them.
 
     Args:
-        setup: an ``ompl.geometric.SimpleSetup``.
+        setup: an ``ompl.geometric.SimpleSetup``, or a geometric planner with its problem
+            definition, where there is no setup. The solves of such a planner are not watched on
+            OMPL 2.0: a goal that is replaced while it is attached is not noticed there.
         heatmap: what to sample, in the coordinates of the setup's space.
         options: how samples follow the heat map. ``sharpness`` None stands for 1 with planners that
-            stop at their first path, and for
+            stop at their first path other than RRTConnect, and for
             :data:`cbagan_ompl.sampling.options.OPTIMIZING_SHARPNESS` with those that go on.
             ``adaptation`` is for planners that goal injection reaches. ``seed`` is that of our
             samples alone; seed OMPL as well for plans that can be repeated.
@@ -150,9 +161,10 @@ def attach(
         A handle with ``.hook``, ``.sample_counts`` and ``.detach()``.
 
     Raises:
-        PlannerError: ``setup`` is no SimpleSetup, no planner is set, no hook of this build reaches
-            it, it samples a heat map already, its space has no (x, y), the start or goal is
-            missing, or the goal cannot be sampled.
+        PlannerError: ``setup`` is neither, no planner is set, no hook of this build reaches it, it
+            is written in Python or plans controls, it samples a heat map already, its space has no
+            (x, y), the start or goal is missing, or the goal cannot be sampled.
+        TaskError: the start is outside or in an obstacle of the heat map's map.
         HeatmapError: not a :class:`Heatmap`, or one that is 0 everywhere in the bounds of the
             space.
         ConfigError: an option that makes no sense, see :class:`SamplerOptions`.
@@ -175,25 +187,29 @@ def attach(
     """
     options = SamplerOptions.of(options, changes)
     check_heatmap(heatmap)
-    planner = _planner_of(setup)
-    _check_attachable(setup, planner)
+    setup = setup_of(setup)
+    planner = planner_of(setup)
     name = class_name(planner)
     hook = hook_of(name)
     if options.sharpness is None:
-        sharpness = 1.0 if stops_at_first(name) else OPTIMIZING_SHARPNESS
+        sharpness = OPTIMIZING_SHARPNESS if wants_sharp(name) else 1.0
         options = replace(options, sharpness=sharpness)
     rng = options.generator()
     space = setup.getStateSpace()
+    release_forgotten()
+    check_task(setup, heatmap, state_access(space))
     heatmap = with_headings(setup, heatmap, options.heading)
     headings = HeadingSampler(heatmap, options.heading, rng, drives_backwards(space))
     states = state_access(space, headings)
-    release_forgotten()
-    injects = hook == GOAL_INJECTION
-    monitor = (goal_monitor if injects else PlannerMonitor)(setup, states)
-    mixture = None
-    if injects:
-        mixture = AdaptiveMixture(heatmap, options.adaptation, _reach_of(planner), monitor)
-    sampler = HeatmapSampler(heatmap, replace(options, seed=rng), monitor, mixture)
+    monitor = _MONITORS.get(hook, PlannerMonitor)(setup, states)
+    budget = _budget_of(planner, name) if options.adaptation.stagnation else None
+    mixture: AdaptiveMixture | RoadmapMixture | None = None
+    if hook in _MONITORS:  # callbacks see the tree
+        reach = _reach_of(planner)
+        mixture = AdaptiveMixture(heatmap, options.adaptation, reach, monitor, budget)
+    elif samples_are_nodes(name) and options.adaptation.coverage:
+        mixture = RoadmapMixture(heatmap, _reach_of(planner), budget)
+    sampler = HeatmapSampler(heatmap, replace(options, seed=rng), monitor, mixture, budget)
     sampler.keep_inside(*position_bounds(space))
     # Samplers and solutions that are there already would keep the planner from asking for samples.
     planner.clear()
@@ -213,41 +229,18 @@ def attach(
     return Attachment(hook, sampler, monitor, setup.getGoal(), undo)
 
 
-def _planner_of(setup: Any) -> Any:
-    """Return the planner of a setup, which may be None; raise if it is no setup."""
-    if not isinstance(setup, og.SimpleSetup):
-        raise PlannerError(
-            f"attach takes an ompl.geometric.SimpleSetup, with its planner, not {show(setup)}"
-        )
-    planner = setup.getPlanner()
-    if planner is not None and setup.getPlanner() is not planner:
-        # OMPL 1.x makes a new object at each call for a planner that C++ has made. One that was
-        # set stays the same.
-        setup.setPlanner(planner)
-    return planner
-
-
-def _check_attachable(setup: Any, planner: Any) -> None:
-    if planner is None:
-        raise PlannerError("attach needs a planner: call setup.setPlanner(...) first")
-    if setup.getGoal() is None or setup.getProblemDefinition().getStartStateCount() == 0:
-        raise PlannerError("attach needs the task: set the start and the goal of the setup first")
-    if not isinstance(setup.getGoal(), ob.GoalSampleableRegion):
-        raise PlannerError(
-            "attach needs a goal that can be sampled, such as a GoalState or GoalStates, this one "
-            f"is a {type(setup.getGoal()).__name__}"
-        )
-    if is_monitored(planner):
-        raise PlannerError(
-            "this planner samples a heat map already: call detach() of its attachment first"
-        )
-
-
 def _reach_of(planner: Any) -> float:
     """Return how far around a node a tree need not grow again, world units: most of its range."""
     # Before its setup a planner may have no range yet; OMPL then takes a fraction of the space.
     si = planner.getSpaceInformation()
-    return _REACH * float(planner.getRange() or _OMPL_RANGE * si.getMaximumExtent())
+    range = planner.getRange() if hasattr(planner, "getRange") else 0.0
+    return _REACH * float(range or _OMPL_RANGE * si.getMaximumExtent())
+
+
+def _budget_of(planner: Any, name: str) -> LearnedBudget:
+    if stops_at_first(name) or hasattr(planner, "bestCost"):
+        return LearnedBudget()
+    return LearnedBudget(EARNED_BY_UNIFORM_UNSEEN, is_halved=False)
 
 
 @dataclass(frozen=True)
@@ -314,6 +307,7 @@ def _inject_goals(wiring: _Wiring) -> Callable[[], None]:
     assert isinstance(wiring.monitor, GoalMonitor)
     injected = InjectedGoal(si, original, wiring.states, wiring.sampler, wiring.monitor)
     setup.setGoal(injected)
+    wiring.monitor.injected_goal = injected
     wiring.monitor.set_injected_fraction(1.0)
 
     def undo() -> None:
@@ -324,7 +318,15 @@ def _inject_goals(wiring: _Wiring) -> Callable[[], None]:
     return undo
 
 
+def _steer_bounds(wiring: _Wiring) -> Callable[[], None]:
+    assert isinstance(wiring.monitor, SteeringMonitor)
+    return install_steering(wiring.setup, wiring.states, wiring.sampler, wiring.monitor)
+
+
+_MONITORS = {GOAL_INJECTION: goal_monitor, BOUNDS_STEERING: SteeringMonitor}
+
 _INSTALL = {
+    BOUNDS_STEERING: _steer_bounds,
     STATE_SAMPLER: _use_state_sampler,
     VALID_STATE_SAMPLER: _use_valid_state_sampler,
     GOAL_INJECTION: _inject_goals,

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from threading import Lock
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.versions import ompl_version
 from ..errors import MissingDependencyError, PlannerError, show
 
 try:
@@ -33,7 +32,15 @@ from ompl import geometric as og  # noqa: E402
 from ompl import tools as ot  # noqa: E402
 from ompl import util as ou  # noqa: E402
 
-__all__ = ["BINDINGS", "BOOST_PYTHON", "HAS_STATE_SAMPLER_ALLOCATOR", "ob", "og", "ou"]
+__all__ = [
+    "BINDINGS",
+    "BOOST_PYTHON",
+    "HAS_STATE_SAMPLER_ALLOCATOR",
+    "ob",
+    "og",
+    "ompl_version",
+    "ou",
+]
 
 #: Whether planners can be given a StateSampler (OMPL 1.7; not bound in 2.0.0 and 2.0.1).
 HAS_STATE_SAMPLER_ALLOCATOR = hasattr(ob.StateSpace, "setStateSamplerAllocator")
@@ -44,15 +51,6 @@ _BROKEN = {"AORRTC", "LazyLBTRRT"} | ({"ABITstar", "AITstar", "BITstar"} if BOOS
 
 # Planners for other spaces than those of a map.
 _OTHER_SPACES = frozenset({"STRRTstar"})
-
-
-@cache
-def ompl_version() -> str:
-    """Return the version of the installed OMPL package; "unknown" for a build without metadata."""
-    try:
-        return version("ompl")
-    except PackageNotFoundError:
-        return "unknown"
 
 
 def _wrap(wrapper: str, function: Callable[..., Any], home: Any = ob) -> Any:
@@ -175,6 +173,60 @@ def start_states(planner: Any) -> list[Any]:
         return [problem.getStartState(i) for i in range(problem.getStartStateCount())]
     data = planner_data(planner)
     return [data.getStartVertex(i).getState() for i in range(data.numStartVertices())]
+
+
+def valid_starts(
+    problem: Any, si: Any, read: Callable[[Any], tuple[float, float]]
+) -> list[tuple[float, float]]:
+    """Return the positions of start states before a planner has begun to plan.
+
+    On OMPL 2.0 they are those that a goal is asked about, which are valid: see
+    :func:`start_states`. Without a validity checker there are none.
+
+    Args:
+        problem: an ``ob.ProblemDefinition`` with a goal.
+        si: its space information.
+        read: returns the position of a state.
+    """
+    if BOOST_PYTHON:
+        return [read(problem.getStartState(i)) for i in range(problem.getStartStateCount())]
+    if si.getStateValidityChecker() is None:
+        return []
+    goal, asked = problem.getGoal(), _AskedGoal(si, read)
+    problem.setGoal(asked)
+    try:
+        problem.isTrivial()
+    finally:
+        problem.setGoal(goal)
+    return asked.positions
+
+
+class _AskedGoal(ob.GoalRegion):  # type: ignore[misc]
+    """A goal that nothing is in, which notes what it is asked about."""
+
+    def __init__(self, si: Any, read: Callable[[Any], tuple[float, float]]) -> None:
+        super().__init__(si)
+        self.positions: list[tuple[float, float]] = []
+        self._read = read
+
+    def distanceGoal(self, state: Any) -> float:  # noqa: N802
+        self.positions.append(self._read(state))
+        return 1.0e300
+
+
+def plans_controls(value: Any) -> bool:
+    """Return whether a value is of ``ompl.control``, where planners have geometric ones' names."""
+    return any(".control" in module for module in _ompl_modules(value))
+
+
+def is_written_in_python(planner: Any) -> bool:
+    """Return whether a planner is a Python subclass of ``ob.Planner`` itself."""
+    return not any(".geometric" in module for module in _ompl_modules(planner))
+
+
+def _ompl_modules(value: Any) -> list[str]:
+    names = [kind.__module__ for kind in type(value).__mro__]
+    return [name for name in names if name.split(".")[0] == "ompl"]
 
 
 def clear_valid_state_sampler(si: Any) -> None:

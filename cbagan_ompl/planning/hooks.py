@@ -15,6 +15,8 @@ VALID_STATE_SAMPLER = "valid-state-sampler"
 #: The planner samples its goal with a probability that can be set, and grows its tree towards the
 #: sample. It asks the goal about each new node as well, so that samples can follow the tree.
 GOAL_INJECTION = "goal-injection"
+#: The planner samples between bounds of its space that callbacks can set for each sample.
+BOUNDS_STEERING = "bounds-steering"
 
 
 @dataclass(frozen=True)
@@ -24,8 +26,11 @@ class PlannerTraits:
     Attributes:
         hook: what it samples from: :data:`STATE_SAMPLER`, :data:`VALID_STATE_SAMPLER` or
             :data:`GOAL_INJECTION`.
+        without_allocator: the hook on builds where no StateSampler can be set.
         stops_at_first: whether its solve ends with the first path.
+        is_greedy: whether its trees grow in a few long strides, so that a narrow region serves it.
         keeps_sampler: whether it makes its sampler when it is set up and keeps it from then on.
+        samples_are_nodes: whether its samples become the nodes of a roadmap, where they are valid.
         hangs_with: the bindings, see :data:`.compat.BINDINGS`, with which a solve never returns
             when its termination condition is a Python function; None for no bindings.
         hangs_at_optimum: whether a solve never returns once it has a path as short as the straight
@@ -35,12 +40,21 @@ class PlannerTraits:
     """
 
     hook: str
+    without_allocator: str | None = None
     stops_at_first: bool = False
+    is_greedy: bool = False
     keeps_sampler: bool = False
+    samples_are_nodes: bool = False
     hangs_with: str | None = None
     hangs_at_optimum: bool = False
     asks_in_thread: bool = False
 
+
+_ROADMAP: dict[str, Any] = {
+    "hook": VALID_STATE_SAMPLER,
+    "samples_are_nodes": True,
+    "asks_in_thread": True,
+}
 
 #: Every planner that some hook reaches on some build, by OMPL's name of its class.
 PLANNERS = {
@@ -53,24 +67,32 @@ PLANNERS = {
     "KPIECE1": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
     "LBKPIECE1": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
     "LBTRRT": PlannerTraits(STATE_SAMPLER),
-    "LazyPRM": PlannerTraits(STATE_SAMPLER, stops_at_first=True, keeps_sampler=True),
-    "LazyPRMstar": PlannerTraits(STATE_SAMPLER, keeps_sampler=True),
+    "LazyPRM": PlannerTraits(
+        STATE_SAMPLER, stops_at_first=True, keeps_sampler=True, samples_are_nodes=True
+    ),
+    "LazyPRMstar": PlannerTraits(STATE_SAMPLER, keeps_sampler=True, samples_are_nodes=True),
     "LazyRRT": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
     "PDST": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
     "PRM": PlannerTraits(
-        VALID_STATE_SAMPLER, stops_at_first=True, hangs_with="nanobind", asks_in_thread=True
+        VALID_STATE_SAMPLER,
+        stops_at_first=True,
+        samples_are_nodes=True,
+        hangs_with="nanobind",
+        asks_in_thread=True,
     ),
-    "PRMstar": PlannerTraits(VALID_STATE_SAMPLER, hangs_with="nanobind", asks_in_thread=True),
+    "PRMstar": PlannerTraits(**_ROADMAP, hangs_with="nanobind"),
     "ProjEST": PlannerTraits(VALID_STATE_SAMPLER, stops_at_first=True),
     "RRT": PlannerTraits(GOAL_INJECTION, stops_at_first=True),
-    "RRTConnect": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
+    "RRTConnect": PlannerTraits(
+        STATE_SAMPLER, without_allocator=BOUNDS_STEERING, stops_at_first=True, is_greedy=True
+    ),
     "RRTXstatic": PlannerTraits(STATE_SAMPLER),
     "RRTsharp": PlannerTraits(STATE_SAMPLER),
     "RRTstar": PlannerTraits(GOAL_INJECTION),
     "SBL": PlannerTraits(VALID_STATE_SAMPLER, stops_at_first=True),
     "SORRTstar": PlannerTraits(GOAL_INJECTION, hangs_at_optimum=True),
-    "SPARS": PlannerTraits(VALID_STATE_SAMPLER, hangs_with="boost", asks_in_thread=True),
-    "SPARStwo": PlannerTraits(VALID_STATE_SAMPLER, hangs_with="boost", asks_in_thread=True),
+    "SPARS": PlannerTraits(**_ROADMAP, hangs_with="boost"),
+    "SPARStwo": PlannerTraits(**_ROADMAP, hangs_with="boost"),
     "SST": PlannerTraits(STATE_SAMPLER),
     "STRIDE": PlannerTraits(VALID_STATE_SAMPLER, stops_at_first=True),
     "TRRT": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
@@ -91,13 +113,14 @@ def hook_of(planner: str) -> str:
         raise PlannerError(
             f"no hook reaches {planner}: its samplers are made inside OMPL; {_list_reached()}"
         )
-    if traits.hook == STATE_SAMPLER and not HAS_STATE_SAMPLER_ALLOCATOR:
+    hook = _available_hook(traits)
+    if hook is None:
         raise PlannerError(
             f"{planner} samples from a StateSampler, which OMPL {ompl_version()} does not let "
             "Python set: it needs a build that binds StateSpace.setStateSamplerAllocator, such "
             f"as ompl 1.7.0; {_list_reached()}"
         )
-    return traits.hook
+    return hook
 
 
 def reached_planners() -> dict[str, str]:
@@ -107,12 +130,8 @@ def reached_planners() -> dict[str, str]:
         >>> reached_planners()["RRTstar"]
         'goal-injection'
     """
-    hooks = {name: PLANNERS[name].hook for name in sorted(planner_names() & PLANNERS.keys())}
-    return {
-        name: hook
-        for name, hook in hooks.items()
-        if hook != STATE_SAMPLER or HAS_STATE_SAMPLER_ALLOCATOR
-    }
+    hooks = {name: _available_hook(PLANNERS[name]) for name in planner_names() & PLANNERS.keys()}
+    return {name: hook for name, hook in sorted(hooks.items()) if hook is not None}
 
 
 def check_planner(planner: str, *, follows_heatmap: bool) -> None:
@@ -152,9 +171,19 @@ def stops_at_first(planner: str) -> bool:
     return planner in PLANNERS and PLANNERS[planner].stops_at_first
 
 
+def wants_sharp(planner: str) -> bool:
+    """Return whether a planner is served best by a heat map that is raised to a power."""
+    return not stops_at_first(planner) or PLANNERS[planner].is_greedy
+
+
 def keeps_sampler(planner: str) -> bool:
     """Return whether a planner makes its sampler when it is set up and keeps it from then on."""
     return planner in PLANNERS and PLANNERS[planner].keeps_sampler
+
+
+def samples_are_nodes(planner: str) -> bool:
+    """Return whether the samples of a planner become the nodes of a roadmap."""
+    return planner in PLANNERS and PLANNERS[planner].samples_are_nodes
 
 
 def hangs_on_python_termination(planner: str) -> bool:
@@ -179,6 +208,12 @@ def class_name(planner: Any) -> str:
         (kind.__name__ for kind in type(planner).__mro__ if kind.__name__ in names),
         type(planner).__name__,
     )
+
+
+def _available_hook(traits: PlannerTraits) -> str | None:
+    if traits.hook == STATE_SAMPLER and not HAS_STATE_SAMPLER_ALLOCATOR:
+        return traits.without_allocator
+    return traits.hook
 
 
 def _list_reached() -> str:

@@ -64,7 +64,9 @@ class HeatmapStateSampler(ob.StateSampler):  # type: ignore[misc]
     def sampleUniform(self, state: Any) -> None:  # noqa: N802
         """Sample the heat map mixed with uniform: what planners take for "uniform"."""
         self._sampler.monitor.note_call(sys._getframe(1))
-        self._states.write(typed_state(state), *self._sampler.next())
+        x, y = self._sampler.next()
+        self._states.write(typed_state(state), x, y)
+        self._sampler.on_new_node(x, y, False)
 
     def sampleUniformNear(self, state: Any, near: Any, distance: float) -> None:  # noqa: N802
         """Sample the heat map inside the box of half width ``distance`` around ``near``."""
@@ -145,8 +147,10 @@ class HeatmapValidStateSampler(ob.ValidStateSampler):  # type: ignore[misc]
     def _sample_valid(self, state: Any, sample: Callable[[], tuple[float, float]]) -> bool:
         typed = typed_state(state)
         for _ in range(self.getNrAttempts()):
-            self._states.write(typed, *sample())
+            x, y = sample()
+            self._states.write(typed, x, y)
             if self._si.isValid(typed):
+                self._sampler.on_new_node(x, y, False)
                 return True
         return False
 
@@ -165,7 +169,12 @@ def state_sampler_allocator(
         >>> allocator = state_sampler_allocator(heatmap, seed=0)
     """
     shared = _heatmap_sampler(heatmap, options, changes)
-    return compat.state_sampler_allocator(lambda space: HeatmapStateSampler(space, shared))
+
+    def allocate(space: Any) -> HeatmapStateSampler:
+        shared.restart()  # a planner makes its sampler when it begins anew
+        return HeatmapStateSampler(space, shared)
+
+    return compat.state_sampler_allocator(allocate)
 
 
 def valid_state_sampler_allocator(
@@ -182,7 +191,12 @@ def valid_state_sampler_allocator(
         >>> allocator = valid_state_sampler_allocator(heatmap, seed=0)
     """
     shared = _heatmap_sampler(heatmap, options, changes)
-    return compat.valid_state_sampler_allocator(lambda si: HeatmapValidStateSampler(si, shared))
+
+    def allocate(si: Any) -> HeatmapValidStateSampler:
+        shared.restart()  # a planner makes its sampler when it begins anew
+        return HeatmapValidStateSampler(si, shared)
+
+    return compat.valid_state_sampler_allocator(allocate)
 
 
 def _heatmap_sampler(

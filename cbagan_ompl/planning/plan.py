@@ -22,13 +22,23 @@ from ..common.validation import (
 from ..errors import ConfigError, MapError, RobotError, show
 from ..maps.endpoints import Moves
 from ..maps.grid_map import GridMap
+from ..maps.grid_search import search_kind
 from ..robots.robot import Robot
 from ..sampling.heatmap import Heatmap
 from ..sampling.options import SamplerOptions
 from . import compat
 from .attach import Attachment, attach
 from .compat import ou
-from .heatmap_sources import LEARNED, UNIFORM, HeatmapSource, heatmap_source
+from .goals import heatmap_of_goals, reached_goal, set_goals, split_goals
+from .heatmap_sources import (
+    CORRIDOR,
+    LEARNED,
+    UNIFORM,
+    HeatmapSource,
+    heatmap_source,
+    is_auto,
+    resolve_auto,
+)
 from .hooks import check_planner, hangs_at_optimum
 from .paths import checked_path, follow_path, path_cost
 from .plan_result import PlanResult
@@ -40,7 +50,7 @@ from .problem import (
 )
 from .solving import Limits, SolveRecord, solve
 from .states import state_access
-from .workspace import Endpoints, Workspace
+from .workspace import Workspace
 
 if TYPE_CHECKING:
     from ..inference.predictor import Predictor
@@ -72,11 +82,12 @@ def plan(
     Args:
         grid: the map, or a file for :meth:`GridMap.load`.
         start: (x, y), world; (x, y, yaw) for a robot with heading, radians.
-        goal: the same.
+        goal: the same, or a list of several of which any will do: paths end in one of them, the
+            heat map has the largest of the values that those of each goal have.
         planner: a geometric planner by OMPL's name, such as ``"RRT"`` or ``"InformedRRTstar"``, or
             as the literature writes it, ``"RRT*"``, ``"RRT-Connect"``...
         sampler: one of :data:`cbagan_ompl.planning.heatmap_sources.SAMPLERS`; ``"uniform"`` leaves
-            OMPL's own sampler in place.
+            OMPL's own sampler in place. What ``"auto"`` chose is the ``sampler`` of the result.
         time: limit of the planner's solve, seconds. RRT-like planners stop at their first
             solution, RRT*-like ones go on to the limit.
         iterations: limit of the planner's iterations, whichever comes first.
@@ -87,8 +98,8 @@ def plan(
         radius: short for ``robot=Robot.disc(radius)``, world units.
         snap: how far a start or goal in an obstacle, in the margin around one, or in unknown space
             is moved at most, to the nearest place where the robot may be, world units.
-        model: for the learned sampler, a loaded model or the file of one; the bundled model by
-            default.
+        model: for the learned sampler (or auto), a loaded model or the file of one; the bundled
+            model by default.
         heatmap: to be sampled in place of the learned one: of this map, or an array (H, W) as
             :class:`Heatmap` takes it.
         simplify: let OMPL's path simplifier shorten the path afterwards.
@@ -122,11 +133,14 @@ def plan(
         raise MapError(f"grid is a GridMap or the file of a map, got {show(grid)}")
     source = grid if isinstance(grid, GridMap) else GridMap.load(grid)
     workspace = Workspace(source, _robot_of(robot, radius))
+    goals = split_goals(goal)
     moves: Moves = {}
     distance = finite_number("snap", snap, 0.0)
     if distance > 0:
-        (start, goal), moves = workspace.snap(start, goal, distance)
-    endpoints = workspace.check_task(start, goal)
+        if len(goals) > 1:
+            raise ConfigError("snap moves one start and one goal: give one goal, or leave snap out")
+        (start, goals[0]), moves = workspace.snap(start, goals[0], distance)
+    tasks = [workspace.check_task(start, one) for one in goals]
     tolerance = source.resolution
     if goal_tolerance is not None:
         tolerance = finite_number("goal_tolerance", goal_tolerance, 0.0)
@@ -134,11 +148,15 @@ def plan(
     planner = planner_name(planner)
     is_plain = isinstance(sampler, str) and sampler == UNIFORM
     check_planner(planner, follows_heatmap=not is_plain)
+    if is_auto(sampler) and heatmap is None:
+        sampler = resolve_auto(source)
+        model = None if sampler == CORRIDOR else model
     name, make_heatmap = heatmap_source(sampler, model, heatmap)
     job = _Job(
         map_name=source.name,
         workspace=workspace,
-        endpoints=endpoints,
+        start=tasks[0][0],
+        goals=[task[1] for task in tasks],
         moves=moves,
         tolerance=tolerance,
         planner=planner,
@@ -161,7 +179,8 @@ class _Job:
 
     map_name: str
     workspace: Workspace
-    endpoints: Endpoints
+    start: NDArray[np.float64]
+    goals: list[NDArray[np.float64]]
     moves: Moves
     tolerance: float
     planner: str
@@ -205,8 +224,9 @@ def _run(job: _Job) -> PlanResult:
     began = perf_counter()
     heatmap, attachment = None, None
     if job.make_heatmap is not None:
-        positions = (endpoint[:2] for endpoint in job.endpoints)
-        heatmap = job.make_heatmap(job.workspace.grid, *positions)
+        heatmap = heatmap_of_goals(
+            job.make_heatmap, job.workspace.grid, job.start[:2], [goal[:2] for goal in job.goals]
+        )
         attachment = attach(setup, heatmap, job.options)
     inference_s = perf_counter() - began if attachment else 0.0
     try:
@@ -219,13 +239,16 @@ def _run(job: _Job) -> PlanResult:
 
 
 def _set_up(job: _Job) -> Any:
-    setup = make_setup(job.workspace, job.endpoints, job.tolerance)
+    nearest = min(job.goals, key=lambda goal: float(np.hypot(*(goal - job.start)[:2])))
+    setup = make_setup(job.workspace, (job.start, nearest), job.tolerance)
+    if len(job.goals) > 1:
+        set_goals(setup, job.workspace, job.goals, setup.getGoal().getThreshold())
     setup.setPlanner(compat.planner_class(job.planner)(setup.getSpaceInformation()))
     if job.range is not None and not set_range(setup.getPlanner(), job.range):
         raise ConfigError(f"{job.planner} has no range to set: leave it out")
     setup.setup()
     if hangs_at_optimum(job.planner):
-        stop_at_optimum(setup, job.endpoints, job.tolerance)
+        stop_at_optimum(setup, (job.start, nearest), job.tolerance)
     return setup
 
 
@@ -249,23 +272,25 @@ def _result(
     inference_s: float,
     simplify_s: float,
 ) -> PlanResult:
-    workspace, checked = job.workspace, None
+    workspace, checked, goal = job.workspace, None, job.goals[0]
     if run.is_exact:
-        checked = checked_path(setup, workspace, job.endpoints, job.tolerance)
+        goal = reached_goal(setup, workspace, job.goals)
+        checked = checked_path(setup, workspace, (job.start, goal), job.tolerance)
     is_solved = checked is not None
-    path = np.empty((0, len(job.endpoints[0]))) if checked is None else checked
+    path = np.empty((0, len(job.start))) if checked is None else checked
     return PlanResult(
         solved=is_solved,
         status=run.status,
         planner=job.planner,
         sampler=job.sampler,
+        grid_search=search_kind() if job.sampler in (CORRIDOR, LEARNED) else None,
         hook=attachment.hook if attachment else None,
         ompl_version=compat.ompl_version(),
         seed=job.seed,
         map=job.map_name,
         robot=workspace.robot,
-        start=job.endpoints[0],
-        goal=job.endpoints[1],
+        start=job.start,
+        goal=goal,
         snapped=job.moves,
         goal_tolerance=job.tolerance,
         path=path,

@@ -27,6 +27,8 @@ class PlanResult:
         planner: OMPL's name of the planner.
         sampler: ``"learned"``, ``"uniform"``, ``"corridor"``, ``"straight-line"`` or
             ``"heatmap"`` (the caller's own).
+        grid_search: ``"compiled"`` or ``"SciPy"``, what makes corridors, and connects the regions
+            of the learned sampler; None for other samplers.
         hook: by which hook the planner was reached; None for the uniform sampler.
         ompl_version: of the installed package.
         seed: what makes the samples of this run again.
@@ -34,7 +36,7 @@ class PlanResult:
         robot: what moves.
         start: (x, y), world, as in :class:`cbagan_ompl.GridMap`; (x, y, yaw) for robots with
             heading. Where the path begins.
-        goal: the same; where it ends.
+        goal: the same; where it ends. Of several goals the one that it reached, or the first.
         snapped: the endpoints that were moved, ``"start"`` or ``"goal"``, each with the point that
             was ``"given"`` and the ``"distance"`` from it, world units; see ``snap``.
         goal_tolerance: how far from the goal a path may end, world units.
@@ -78,6 +80,7 @@ class PlanResult:
     status: str
     planner: str
     sampler: str
+    grid_search: str | None
     hook: str | None
     ompl_version: str
     seed: int

@@ -6,12 +6,12 @@ from dataclasses import replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from ..common.validation import whole_number
-from ..errors import MapError, show
+from ..maps.checks import check_grid
 from ..maps.grid_map import GridMap
+from ..robots.poses import check_pose
 from ..sampling.heatmap import Heatmap
 from .heatmap_sources import LEARNED, heatmap_source, loaded_model
 from .plan import plan
@@ -71,13 +71,14 @@ class Replanner:
         model: Predictor | str | PathLike[str] | None = None,
         **options: Any,
     ) -> None:
-        self.grid = _check_grid(grid)
+        check_grid(grid)
+        self.grid = grid
         self.goal = goal
         self.heatmap: Heatmap | None = None
         self._last: PlanResult | None = None
         seed = options.pop("seed", None)
         self._next_seed = None if seed is None else whole_number("seed", seed, 0)
-        if sampler == LEARNED:
+        if isinstance(sampler, str) and sampler == LEARNED:
             model = loaded_model(model)
         heatmap_source(sampler, model)  # what the first plan would raise, it raises now
         self._fresh = {"sampler": sampler, "model": model}
@@ -97,7 +98,8 @@ class Replanner:
             CbaganOmplError: as :func:`cbagan_ompl.plan`.
         """
         if grid is not None:
-            self.grid = _check_grid(grid)
+            check_grid(grid)
+            self.grid = grid
         kept = self.heatmap if self._serves(start) else None
         options = {**self._options, **(self._fresh if kept is None else {"heatmap": kept})}
         if self._next_seed is not None:
@@ -121,20 +123,10 @@ class Replanner:
             _frame(grid) != _frame(before) or (self.heatmap.region & ~grid.free).any()
         ):
             return False
-        # Of a pose the position counts; what is no point at all is found out by the plan.
-        position = (
-            np.asarray(start)[:2]
-            if self._last.robot.has_heading and np.shape(start) == (3,)
-            else start
-        )
+        has_heading = self._last.robot.has_heading
+        position = check_pose("start", start)[:2] if has_heading else start
         return self.heatmap.connects(position, self._last.goal[:2])
 
 
 def _frame(grid: GridMap) -> tuple[object, ...]:
     return grid.shape, grid.resolution, grid.origin
-
-
-def _check_grid(grid: GridMap) -> GridMap:
-    if not isinstance(grid, GridMap):
-        raise MapError(f"a Replanner takes a GridMap, got {show(grid)}; see GridMap.load")
-    return grid

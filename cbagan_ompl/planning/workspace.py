@@ -67,7 +67,7 @@ class Workspace:
         if self.robot.has_heading:
             return check_poses(self.checker, start, goal)
         for role, point in (("start", start), ("goal", goal)):
-            if np.shape(point) == (3,):
+            if _has_yaw(point):
                 raise TaskError(
                     f"{role} has a yaw, but the robot, a {self.robot.shape}, has no heading: give "
                     "x, y alone, or a robot with a shape or a turning radius"
@@ -172,3 +172,10 @@ class Workspace:
             motions.checkMotion(compat.typed_state(a), compat.typed_state(b))
             for a, b in pairwise(states)
         )
+
+
+def _has_yaw(point: ArrayLike) -> bool:
+    try:
+        return np.shape(point) == (3,)
+    except Exception:  # rows of different lengths, or whatever the class raises
+        return False

@@ -174,25 +174,25 @@ def describe_collision(grid: GridMap, robot: Robot, role: str, pose: NDArray[np.
     place = f"{role} {_format(pose)} of {grid.name}: "
     outline = _outline(robot, pose)
     pixels = grid.to_pixel(outline)
-    low, high = np.floor(pixels.min(0)).astype(int), np.ceil(pixels.max(0)).astype(int)
-    if (low < 0).any() or (high > (grid.width, grid.height)).any():
+    size = grid.width, grid.height
+    if (pixels < 0).any() or (pixels > size).any():
         return place + "the robot reaches beyond the border of the map; choose another pose"
+    # A pixel more on each side, since contact counts.
+    low = np.maximum(np.floor(pixels.min(0)).astype(int) - 1, 0)
+    high = np.minimum(np.ceil(pixels.max(0)).astype(int) + 1, size)
     rows, columns = np.nonzero(~grid.free[low[1] : high[1], low[0] : high[0]])
     centres = np.stack((columns + low[0], rows + low[1]), axis=-1) + 0.5
     contour = pixels.astype(np.float32)[:, None]
     inside = [cv2.pointPolygonTest(contour, (u, v), measureDist=True) for u, v in centres.tolist()]
-    if not inside:
-        return place + "the robot touches an obstacle; choose another pose"
     deepest = centres[int(np.argmax(inside))]
     x, y = _in_frame(grid.to_world(deepest), pose)
     length = robot.circumscribed_radius
     along = "front" if x > 0.2 * length else "rear" if x < -0.2 * length else "middle"
-    side = "left " if y > 0.2 * length else "right " if y < -0.2 * length else ""
     column, row = np.floor(deepest).astype(int).tolist()
     return (
-        f"{place}the robot's {along} {side}touches an obstacle, at ({x:.3g}, {y:.3g}) in its own "
+        f"{place}the robot's {along} touches an obstacle, at ({x:.3g}, {y:.3g}) in its own "
         f"frame (pixel column {column}, row {row}); choose another pose"
-    ).replace("  ", " ")
+    )
 
 
 def _outline(robot: Robot, pose: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -7,7 +7,9 @@
 3. Stagnation. Before the first path our fraction of the samples halves with every 128 learned
    samples that bring the tree into no new part of the region, down to a quarter. A node in a new
    part restores it.
-4. After the first path samples follow the heat map again; for informed planners, where a shorter
+4. Budget, with stagnation. Before the first path the number of learned samples is bounded, see
+   :mod:`.budget`. This rule alone needs no tree to watch.
+5. After the first path samples follow the heat map again; for informed planners, where a shorter
    path can pass.
 
 Of our samples the uniform fraction that was asked for stays uniform throughout, so that a planner
@@ -16,6 +18,7 @@ stays probabilistically complete.
 
 from __future__ import annotations
 
+from .budget import LearnedBudget
 from .heatmap import Heatmap
 from .monitor import Monitor
 from .options import Adaptation
@@ -39,14 +42,21 @@ class AdaptiveMixture:
         adaptation: the rules that are on.
         reach: how far around a node its tree is taken to be, at most, world units.
         monitor: of the planner; it is told the fraction of the planner's samples that is ours.
+        budget: of the learned samples, which nodes in new parts of the region add to; or None.
     """
 
     def __init__(
-        self, heatmap: Heatmap, adaptation: Adaptation, reach: float, monitor: Monitor
+        self,
+        heatmap: Heatmap,
+        adaptation: Adaptation,
+        reach: float,
+        monitor: Monitor,
+        budget: LearnedBudget | None = None,
     ) -> None:
         self._region = heatmap.region.tobytes()
         self._adaptation = adaptation
         self._monitor = monitor
+        self._budget = budget
         self._tree = TreeCoverage(heatmap.grid, reach)
         self.covered = self._tree.mask if adaptation.coverage else None
         self._fraction = self._most = 1.0
@@ -84,6 +94,8 @@ class AdaptiveMixture:
         if pixel is not None and self._region[pixel]:
             self._samples_in_vain = 0
             self._set_fraction(self._most)
+            if self._budget is not None:
+                self._budget.earn_by_node()
         self._is_in_goal = in_goal
 
     def on_sample(self) -> None:
@@ -117,6 +129,8 @@ class AdaptiveMixture:
         self._is_in_goal = False
         self._is_watching = self._watches
         self._tree.clear()
+        if self._budget is not None:
+            self._budget.restart()
         self._set_fraction(self._most)
 
     def _set_fraction(self, fraction: float) -> None:

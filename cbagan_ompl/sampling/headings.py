@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import floor, isnan, nan, pi, remainder
+from math import floor, isnan, nan, pi
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -53,8 +53,7 @@ def check_headings(heading: ArrayLike, grid: GridMap) -> NDArray[np.float32]:
             "unknown it is NaN"
         )
     # Wrapped before the rounding to float32, which large angles do not survive.
-    exact = raw.astype(np.float64)
-    wrapped = (exact - 2 * np.pi * np.round(exact / (2 * np.pi))).astype(np.float32)
+    wrapped = ((raw.astype(np.float64) + np.pi) % (2 * np.pi) - np.pi).astype(np.float32)
     wrapped.setflags(write=False)
     return wrapped
 
@@ -113,7 +112,7 @@ def sample_headings(
         reverses: whether the robot drives backwards as well; otherwise no heading is reversed.
 
     Returns:
-        Radians in [-pi, pi], the shape of ``known``; uniform where the heading is unknown.
+        Radians in [-pi, pi), the shape of ``known``; uniform where the heading is unknown.
 
     Example:
         >>> rng = np.random.default_rng(0)
@@ -129,7 +128,7 @@ def sample_headings(
     headings = np.where(
         (choice < uniform) | np.isnan(headings), rng.uniform(-np.pi, np.pi, known.shape), headings
     )
-    return np.asarray(headings - 2 * np.pi * np.round(headings / (2 * np.pi)))
+    return np.asarray((headings + np.pi) % (2 * np.pi) - np.pi)
 
 
 class HeadingSampler:
@@ -145,7 +144,7 @@ class HeadingSampler:
         >>> from cbagan_ompl import GridMap, Heatmap
         >>> heatmap = Heatmap([[1.0]], GridMap([[1]]))
         >>> sampler = HeadingSampler(heatmap, HeadingSpread(), np.random.default_rng(0))
-        >>> -pi <= sampler.sample(0.5, 0.5) <= pi
+        >>> -pi <= sampler.sample(0.5, 0.5) < pi
         True
     """
 
@@ -164,7 +163,7 @@ class HeadingSampler:
         self._pending: list[tuple[float, float]] = []
 
     def sample(self, x: float, y: float) -> float:
-        """Return the heading of a sample, in [-pi, pi].
+        """Return the heading of a sample, in [-pi, pi), since OMPL takes pi to be out of bounds.
 
         Args:
             x: of the sample, world.
@@ -174,7 +173,7 @@ class HeadingSampler:
             self._refill()
         deviation, uniform = self._pending.pop()
         heading = self._known(x, y)
-        return uniform if isnan(heading) else remainder(heading + deviation, 2 * pi)
+        return uniform if isnan(heading) else (heading + deviation + pi) % (2 * pi) - pi
 
     def _refill(self) -> None:
         # What is sampled around 0 may be added to any heading.

@@ -312,7 +312,7 @@ class Heatmap:
             reverses: whether the robot drives backwards as well.
 
         Returns:
-            (x, y, yaw), shape (n, 3), world, yaw in [-pi, pi].
+            (x, y, yaw), shape (n, 3), world, yaw in [-pi, pi).
 
         Raises:
             ConfigError: as for :meth:`sample`, or ``spread`` is no :class:`HeadingSpread`.

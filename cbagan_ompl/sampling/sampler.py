@@ -10,12 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .adaptation import AdaptiveMixture
+from .budget import LearnedBudget
 from .checks import check_heatmap
 from .headings import HeadingSampler
 from .heatmap import Heatmap
 from .monitor import Monitor, NoMonitor
 from .options import SamplerOptions
 from .pixel_sampler import PixelSampler
+from .roadmap import RoadmapMixture
 
 # Candidates of which a local sample is one, with probability proportional to the heat map.
 _LOCAL_CANDIDATES = 32
@@ -39,6 +41,7 @@ class HeatmapSampler:
         options: how samples follow it; ``sharpness`` None stands for 1.
         monitor: of the planner that is fed.
         mixture: adapts the learned samples to the planner's tree; None leaves them as they are.
+        budget: bounds the learned samples before the first path; None leaves them unbounded.
         **changes: single fields of :class:`.options.SamplerOptions`, such as ``seed=1``.
 
     Raises:
@@ -58,7 +61,8 @@ class HeatmapSampler:
         heatmap: Heatmap,
         options: SamplerOptions | None = None,
         monitor: Monitor | None = None,
-        mixture: AdaptiveMixture | None = None,
+        mixture: AdaptiveMixture | RoadmapMixture | None = None,
+        budget: LearnedBudget | None = None,
         **changes: Any,
     ) -> None:
         options = SamplerOptions.of(options, changes)
@@ -72,6 +76,7 @@ class HeatmapSampler:
         self._spread = options.heading
         self.monitor = monitor or NoMonitor()
         self._mixture = mixture
+        self._budget = budget
         self._learned_count = self._uniform_count = 0
         self._best = inf
         self._has_begun = False
@@ -123,6 +128,13 @@ class HeatmapSampler:
             self._has_begun = True
             self._mixture.on_start(self.monitor.connects(self.heatmap))
 
+    def restart(self) -> None:
+        """Note that the planner begins anew, without a tree."""
+        if self._mixture is not None:
+            self._mixture.restart()
+        if self._budget is not None:
+            self._budget.restart()
+
     def on_new_node(self, x: float, y: float, in_goal: bool) -> None:
         """Note that the planner's tree has a new node.
 
@@ -144,7 +156,7 @@ class HeatmapSampler:
             if point is not None:
                 self._learned_count += 1
                 return point
-        self._uniform_count += 1
+        self._count_uniform()
         point = self._uniform.next(best, None)
         assert point is not None, "nothing was rejected"
         return point
@@ -173,8 +185,12 @@ class HeatmapSampler:
         return self._pick(np.clip(candidates, *self._box))
 
     def _next_learned(self, best: float) -> tuple[float, float] | None:
-        mixture = self._mixture
-        if mixture is None or best < inf:
+        mixture, budget = self._mixture, self._budget
+        if best < inf:
+            return self._learned.next(best, None)
+        if budget is not None and not budget.spend():
+            return None
+        if mixture is None:
             return self._learned.next(best, None)
         mixture.on_sample()
         point = self._learned.next(best, mixture.covered)
@@ -187,18 +203,19 @@ class HeatmapSampler:
             informed = self.monitor.informed_set() if best < inf else None
             self._learned.set_informed(informed)
             self._uniform.set_informed(informed)
-        if self._mixture is not None:
-            if best < self._best:
-                self._mixture.on_solution()
-            else:
-                self._mixture.restart()
+        if best > self._best:
+            self.restart()
+        elif self._mixture is not None:
+            self._mixture.on_solution()
         self._best = best
 
     def _pick(self, candidates: NDArray[np.float64]) -> tuple[float, float]:
         """Choose one of the candidates by its heat, or the first one as the uniform sample."""
         grid = self.heatmap.grid
         chosen, uniform = 0, True
-        if self.chance() >= self._uniform_fraction:
+        if self.chance() >= self._uniform_fraction and (
+            self._budget is None or self._best < inf or self._budget.spend()
+        ):
             free = grid.is_free(candidates)
             columns, rows = grid.to_pixel(candidates[free]).astype(np.intp).T
             heat = np.zeros(len(candidates))
@@ -208,7 +225,14 @@ class HeatmapSampler:
                 threshold = self.chance() * cumulative[-1]
                 chosen = int(np.searchsorted(cumulative, threshold, side="right"))
                 uniform = False
-        self._uniform_count += uniform
-        self._learned_count += not uniform
+        if uniform:
+            self._count_uniform()
+        else:
+            self._learned_count += 1
         x, y = candidates[chosen].tolist()
         return x, y
+
+    def _count_uniform(self) -> None:
+        self._uniform_count += 1
+        if self._budget is not None:
+            self._budget.earn_by_uniform()

@@ -149,9 +149,9 @@ class Gan:
         """
         try:
             for name, network in self._networks.items():
-                if name in state:
-                    weights = state["average" if name == "generator" else name]
-                    network.load_state_dict(weights)
+                source = "average" if name == "generator" else name
+                if source in state:
+                    network.load_state_dict(state[source])
         except Exception as error:  # torch raises several types
             raise ConfigError(
                 "the run to start from has other networks: set the same options of the networks"

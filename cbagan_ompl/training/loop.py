@@ -25,6 +25,7 @@ from .checkpoints import SCHEMA, best_generator, load_checkpoint, save_checkpoin
 from .config import BEST, LAST, TrainingConfig
 from .distributed import ProcessGroup, pick_device, process_group
 from .gan import Gan
+from .model_weights import starting_weights
 from .schedule import learning_rate_factor, plateau_factor
 from .steps import adversarial_weights, discriminator_step, generator_step
 from .task_sources import TaskSource
@@ -93,8 +94,9 @@ def train(
         resume: go on from ``last.pt`` in that folder, or begin where a run ended before its first
             epoch; without it the folder must hold no run. The recipe may ask for more epochs than
             the run began with: from there on the learning rates are those of the longer run.
-        start_from: checkpoint of another run of the same networks, whose weights this one begins
-            with.
+        start_from: checkpoint of another run of the same networks, or an exported model (a file
+            or the name of a bundled one), whose weights this run begins with. Discriminators are
+            in checkpoints alone.
         device: ``auto`` (a GPU if there is one), ``cpu``, ``cuda``, ...
         progress: show a progress bar.
         tensorboard: write losses and scores for TensorBoard into the folder as well.
@@ -122,7 +124,7 @@ def train(
                 f"batches of {config.batch_size} cannot be shared evenly by {group.size} processes"
             )
         resume = group.from_leader(_prepare_folder(folder, resume) if group.is_leader else None)
-        run = _start_run(config, target, group, start_from)
+        run = _start_run(config, target, group, None if resume else start_from, source)
         if resume:
             state = _load_matching(folder / LAST, config, source) if group.is_leader else None
             state = group.from_leader(state)
@@ -152,6 +154,7 @@ def _start_run(
     device: torch.device,
     group: ProcessGroup,
     start_from: str | PathLike[str] | None,
+    source: TaskSource,
 ) -> Run:
     run = Run(
         Gan(config, device, group),
@@ -159,7 +162,7 @@ def _start_run(
         torch.Generator().manual_seed(config.seed),
     )
     if start_from is not None:
-        run.gan.start_from(load_checkpoint(start_from)["gan"])
+        run.gan.start_from(starting_weights(start_from, source.validation))
     return run
 
 

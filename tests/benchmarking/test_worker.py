@@ -9,6 +9,7 @@ from helpers.benchmarks import Finished
 from helpers.tasks import GOAL, START
 
 from cbagan_ompl import GridMap, Heatmap, HeatmapError, Task
+from cbagan_ompl.benchmarking.inputs import record_inputs
 from cbagan_ompl.benchmarking.logs import parse_log
 from cbagan_ompl.benchmarking.settings import Settings
 from cbagan_ompl.benchmarking.tasks import BenchmarkTask, heatmap_file
@@ -34,6 +35,17 @@ def test_heat_maps_of_others(two_walls: GridMap, corridor: Heatmap, tmp_path: Pa
     ]
     assert int(log.planners[1].runs[0]["learned draws INTEGER"]) > 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["two_walls_0.png", "x.log"]
+
+
+def test_auto_is_the_corridor_of_a_small_map(tmp_path: Path) -> None:
+    grid = GridMap(np.ones((64, 64), bool), name="small")
+    task = BenchmarkTask(Workspace(grid), 0, Task((5, 5), (60, 60)))
+    settings = Settings(("RRT",), ("uniform", "auto"), runs=1, time=0.2)
+    run_job(Job(task, settings, tmp_path / "x.log"), lambda: None)
+    log = parse_log((tmp_path / "x.log").read_text())
+    assert log.planners[1].name == "geometric_RRT_auto"
+    assert int(log.planners[1].runs[0]["learned draws INTEGER"]) > 0
+    assert record_inputs([task], settings)["model_hashes"].keys() == {"learned"}
 
 
 def test_only_the_other_samplers_have_heat_maps(finished: Finished) -> None:

@@ -160,5 +160,5 @@ def test_packages() -> None:
 
 def test_torch_is_named_where_it_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "torch", None)
-    with pytest.raises(MissingDependencyError, match=r"this needs torch.*cbagan-ompl\[torch\]"):
+    with pytest.raises(MissingDependencyError, match=r"this needs torch.*in the clone.*\[torch\]"):
         require_torch()

@@ -94,7 +94,10 @@ def test_pgm_in_all_its_forms(tmp_path, data, free):
 def test_plain_text_of_many_blocks(white: int) -> None:
     rng = np.random.default_rng(white)
     levels = rng.integers(0, white + 1, (700, 1000))
-    gaps = rng.choice([" ", "\n", "  ", "\r\n", "\t00", " #7\n"], levels.size)
+    gaps = rng.choice(
+        [" ", "\n", "  ", "\r\n", "\t00", " #7\n", "#\n", "\n# long " + "comment" * 7 + "#\n"],
+        levels.size,
+    )
     gaps[0] = ""
     words = "".join(f"{gap}{level}" for gap, level in zip(gaps, levels.ravel(), strict=True))
     data = f"P2 1000 700 {white}\n0000000000000000000000{words} more".encode()

@@ -11,6 +11,7 @@ import pytest
 from helpers.setups import (
     SMALL_GOAL,
     TOLERANCE,
+    path_positions,
     small_heatmap,
     small_setup,
     small_walls,
@@ -87,7 +88,7 @@ def test_another_planner_gets_the_goal_itself(attached: str, how: str, state: st
         problem = solve_other(setup, planner, how)
         assert attachment.sample_counts == counts, planner
         if problem.hasExactSolution():
-            end = compat.path_positions(problem.getSolutionPath())[-1]
+            end = path_positions(problem.getSolutionPath())[-1]
             assert np.hypot(*(end - SMALL_GOAL)) <= TOLERANCE, planner
         # The attached planner samples the heat map again, and the goal is reached.
         setup.setPlanner(ours)
@@ -127,7 +128,7 @@ def test_rrt_that_has_a_path_ends_in_the_goal_when_asked_again() -> None:
     setup, attachment = prepare("RRT", "new")
     for _ in range(5):
         assert compat.is_exact(setup.solve(1.0))
-        end = compat.path_positions(setup.getSolutionPath())[-1]
+        end = path_positions(setup.getSolutionPath())[-1]
         assert np.hypot(*(end - SMALL_GOAL)) <= TOLERANCE
     attachment.detach()
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.setups import path_positions
 from helpers.tasks import GOAL, START
 from scipy.stats import mannwhitneyu
 
@@ -74,7 +75,7 @@ def until(stop: Callable[[], bool], limit: int = 100_000) -> tuple[Any, list[int
 
 
 def path_end(setup: Any) -> np.ndarray:
-    return compat.path_positions(setup.getSolutionPath())[-1]
+    return path_positions(setup.getSolutionPath())[-1]
 
 
 def test_table_of_hooks() -> None:
@@ -83,8 +84,9 @@ def test_table_of_hooks() -> None:
     assert reached["PRM"] == reached["BKPIECE1"] == "valid-state-sampler"
     trees = ("RRT", "RRTstar", "InformedRRTstar", "SORRTstar")
     assert {reached[name] for name in trees} == {"goal-injection"}
-    by_state_sampler = reached.get("RRTConnect") == "state-sampler"
-    assert by_state_sampler == compat.HAS_STATE_SAMPLER_ALLOCATOR
+    sets_samplers = compat.HAS_STATE_SAMPLER_ALLOCATOR
+    assert reached["RRTConnect"] == ("state-sampler" if sets_samplers else "bounds-steering")
+    assert ("LBKPIECE1" in reached) == sets_samplers
 
 
 @pytest.mark.parametrize("planner", sorted(reached_planners()))
@@ -93,7 +95,7 @@ def test_planner_draws_from_the_heatmap(
 ) -> None:
     compat.seed_ompl(1)
     setup = make_setup(two_walls, planner)
-    with attach(setup, corridor, seed=1) as attachment:
+    with attach(setup, corridor, seed=1, adaptation=NO_ADAPTATION) as attachment:
         assert attachment.hook == reached_planners()[planner]
         status = setup.solve(0.4)
         assert attachment.sample_counts["learned"] > 20
@@ -101,7 +103,7 @@ def test_planner_draws_from_the_heatmap(
         least = 0.5 if planner == "STRIDE" else 1.0
         assert attachment.sample_counts["learned"] > least * attachment.sample_counts["uniform"]
         if compat.is_exact(status):
-            path = compat.path_positions(setup.getSolutionPath())
+            path = path_positions(setup.getSolutionPath())
             assert two_walls.path_is_free(path)
             assert np.hypot(*(path[-1] - GOAL)) <= 2.0
 
@@ -237,7 +239,7 @@ def test_poses(two_walls: GridMap, corridor: Heatmap, kind: str, planner: str) -
     bounds.setHigh(256.0)
     space.setBounds(bounds)
     setup = make_setup(two_walls, planner, space)
-    with attach(setup, corridor, seed=0) as attachment:
+    with attach(setup, corridor, seed=0, adaptation=NO_ADAPTATION) as attachment:
         setup.solve(0.4)
         # PRM ends with its first path, after a few dozen samples.
         assert attachment.sample_counts["learned"] > (10 if planner == "PRM" else 50)
@@ -257,7 +259,7 @@ def test_unreached_planners_say_what_would_reach_them(
             attach(make_setup(two_walls, "EITstar"), corridor)
     if not compat.HAS_STATE_SAMPLER_ALLOCATOR:
         with pytest.raises(PlannerError, match=r"setStateSamplerAllocator, such as ompl 1\.7\.0"):
-            attach(make_setup(two_walls, "RRTConnect"), corridor)
+            attach(make_setup(two_walls, "LBKPIECE1"), corridor)
 
 
 def test_a_build_that_binds_the_allocator_uses_it(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -344,7 +346,7 @@ def test_attach_after_a_solve(two_walls: GridMap, corridor: Heatmap, planner: st
     """Samplers and solutions of an earlier run do not keep the planner from drawing."""
     setup = make_setup(two_walls, planner)
     setup.solve(0.1)
-    with attach(setup, corridor, seed=0) as attachment:
+    with attach(setup, corridor, seed=0, adaptation=NO_ADAPTATION) as attachment:
         setup.solve(0.2)
         assert attachment.sample_counts["learned"] > 20
 

@@ -19,11 +19,15 @@ from cbagan_ompl import (
     GridMap,
     GridMotionValidator,
     GridValidityChecker,
+    HeadingSpread,
     Heatmap,
     HeatmapStateSampler,
     HeatmapValidStateSampler,
     Predictor,
+    Replanner,
     Robot,
+    RobotMotionValidator,
+    RobotValidityChecker,
     SamplerOptions,
     attach,
     load_model,
@@ -37,6 +41,7 @@ from cbagan_ompl import (
 from cbagan_ompl.planning import compat
 from cbagan_ompl.planning.compat import og, ou
 from cbagan_ompl.planning.problem import make_setup
+from cbagan_ompl.planning.workspace import Workspace
 from cbagan_ompl.sampling.sampler import HeatmapSampler
 
 
@@ -46,7 +51,7 @@ def model() -> Predictor:
 
 
 def fresh_setup() -> Any:
-    setup = make_setup(GRID, GRID.check_task(START, GOAL), 1.0)
+    setup = make_setup(Workspace(GRID), GRID.check_task(START, GOAL), 1.0)
     setup.setPlanner(og.RRT(setup.getSpaceInformation()))
     return setup
 
@@ -62,7 +67,7 @@ def run_attach(setup: Any = None, heatmap: Any = HEATMAP, **changes: Any) -> Non
 
 
 def without_planner() -> Any:
-    return make_setup(GRID, GRID.check_task(START, GOAL), 1.0)
+    return make_setup(Workspace(GRID), GRID.check_task(START, GOAL), 1.0)
 
 
 def space_information() -> Any:
@@ -169,6 +174,24 @@ CALLS: dict[str, Callable[[Any], object]] = {
     "Robot.rectangle(turning_radius)": lambda value: Robot.rectangle(1.0, 1.0, value),
     "Robot.rectangle(reverse)": lambda value: Robot.rectangle(1.0, 1.0, reverse=value),
     "Robot.polygon(vertices)": Robot.polygon,
+    "RobotValidityChecker(si)": lambda value: RobotValidityChecker(value, GRID, Robot.point()),
+    "RobotValidityChecker(robot)": lambda value: RobotValidityChecker(
+        space_information(), GRID, value
+    ),
+    "RobotMotionValidator(grid)": lambda value: RobotMotionValidator(
+        space_information(), value, Robot.point()
+    ),
+    "RobotMotionValidator(robot)": lambda value: RobotMotionValidator(
+        space_information(), GRID, value
+    ),
+    "plan(robot)": lambda value: run_plan(robot=value),
+    "plan(several goals)": lambda value: run_plan(goal=[GOAL, value]),
+    "HeadingSpread(spread)": HeadingSpread,
+    "HeadingSpread(uniform_fraction)": lambda value: HeadingSpread(uniform_fraction=value),
+    "Replanner(grid)": lambda value: Replanner(value, GOAL, sampler="uniform"),
+    "Replanner(sampler)": lambda value: Replanner(GRID, GOAL, sampler=value),
+    "Replanner(model)": lambda value: Replanner(GRID, GOAL, model=value),
+    "Replanner(seed)": lambda value: Replanner(GRID, GOAL, sampler="uniform", seed=value),
     # Files.
     "load_tasks(path)": lambda value: load_tasks(value, GRID),
     "load_tasks(grid)": lambda value: load_tasks("/nonexistent/x.csv", value),
@@ -217,7 +240,7 @@ def test_the_table_covers_the_public_names() -> None:
     callables = {name.partition("(")[0].partition(".")[0] for name in CALLS}
     made_by_us = {"Attachment", "PlanResult", "Task"}
     no_arguments = {"bundled_maps", "reached_planners"}
-    errors = {name for name in cbagan_ompl.__all__ if name.endswith("Error")}
+    errors = {name for name in cbagan_ompl.__all__ if name.endswith(("Error", "Warning"))}
     assert set(cbagan_ompl.__all__) <= callables | made_by_us | no_arguments | errors
 
 

@@ -18,6 +18,7 @@ from cbagan_ompl import (
     ModelError,
     PlannerError,
     Replanner,
+    Robot,
     SamplerOptions,
     TaskError,
 )
@@ -162,6 +163,31 @@ def test_learned(two_walls: GridMap) -> None:
     assert second.heatmap_kept
     assert second.sampler == "learned"
     assert second.heatmap is first.heatmap
+
+
+def test_robots_with_heading_have_poses(two_walls: GridMap) -> None:
+    options = {**OPTIONS, "robot": Robot.rectangle(8, 4), "range": 40}
+    replanner = Replanner(two_walls, (*GOAL, 0.0), **options)
+    first = replanner.plan((*START, 0.0))
+    assert first.solved
+    assert first.path.shape[1] == 3
+    assert first.heatmap is not None
+    for pose in first.trajectory[20:]:
+        if first.heatmap.connects(pose[:2], GOAL):
+            break
+    second = replanner.plan(pose)
+    assert second.solved
+    assert second.heatmap_kept
+    with pytest.raises(TaskError, match="start"):
+        replanner.plan(START)
+
+
+@pytest.mark.parametrize("start", ["here", (1, 2, 3, 4), ((1, 2), (3,)), None])
+def test_what_is_no_start(two_walls: GridMap, start: Any) -> None:
+    replanner = Replanner(two_walls, GOAL, **OPTIONS)
+    replanner.plan(START)
+    with pytest.raises(TaskError, match="start"):
+        replanner.plan(start)
 
 
 @pytest.mark.parametrize(

@@ -113,6 +113,19 @@ def test_poses_without_headings_are_uniform() -> None:
     assert np.abs(counts - 500).max() < 110
 
 
+def test_headings_stay_below_pi() -> None:
+    """OMPL takes a yaw of pi, unlike -pi, to be out of bounds."""
+    rng = np.random.default_rng(6)
+    still = HeadingSpread(spread=1e-300, uniform_fraction=1e-6)
+    for heading in (pi, -pi, 3 * pi, np.nextafter(pi, 0)):
+        sampled = sample_headings(np.full(100, heading), still, rng)
+        assert (sampled >= -pi).all()
+        assert (sampled < pi).all()
+        heatmap = Heatmap([[1.0]], GridMap([[1]]), [[heading]])
+        one = HeadingSampler(heatmap, still, rng).sample(0.5, 0.5)
+        assert -pi <= one < pi
+
+
 def test_reversals() -> None:
     spread = HeadingSpread(spread=0.1, uniform_fraction=0.1, reverse_fraction=0.3)
     rng = np.random.default_rng(3)

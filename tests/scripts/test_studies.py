@@ -60,6 +60,20 @@ def test_paper_tables(folder: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_headings(tmp_path: Path) -> None:
+    pytest.importorskip("torch")
+    rows, report = tmp_path / "rows.jsonl", tmp_path / "headings.json"
+    words = ["--maps", "bundled:rooms", "--tasks-per-map", "1", "--planners", "RRT"]
+    words += ["--spaces", "SE2", "--time", "0.2", "--first", "--rows", str(rows)]
+    for _ in range(2):  # the second time every run is there already
+        run_script(STUDIES / "headings.py", *words, "--json", str(report))
+        assert len(rows.read_text().splitlines()) == 3
+    summary = json.loads(report.read_text())["rows"]
+    samplers = ["OMPL's own", "positions only", "default"]
+    assert [row["sampler"] for row in summary] == samplers
+    assert all((row["inference_ms"] > 0) == (row["sampler"] != "OMPL's own") for row in summary)
+
+
 def test_replanning(tmp_path: Path) -> None:
     pytest.importorskip("torch")
     report = tmp_path / "replanning.json"
@@ -72,3 +86,24 @@ def test_replanning(tmp_path: Path) -> None:
         assert all(of["cycles"] == 4 for of in result[scene].values())
         assert result[scene]["uniform"]["kept"] == result[scene]["fresh"]["kept"] == 0
     assert result["static"]["kept"]["kept"] >= 0.5
+
+
+@pytest.mark.slow
+def test_rrtconnect(tmp_path: Path) -> None:
+    pytest.importorskip("torch")
+    report = tmp_path / "rrtconnect.json"
+    words = ["--synthetic", "2", "--runs", "2", "--json", str(report)]
+    printed = run_script(STUDIES / "rrtconnect.py", *words)
+    assert "range 20 px" in printed
+    rows = json.loads(report.read_text())["ranges"]["20 px"]
+    assert rows["uniform"]["planning_ratio"] == rows["uniform"]["iterations_ratio"] == 1
+    assert rows["learned"]["our_samples"] > 0
+
+
+def test_wrong_heatmaps(tmp_path: Path) -> None:
+    report = tmp_path / "wrong.json"
+    words = ["--planners", "RRT,RRTstar", "--runs", "2", "--json", str(report)]
+    run_script(STUDIES / "wrong_heatmaps.py", *words)
+    planners = json.loads(report.read_text())["planners"]
+    assert set(planners) == {"RRT", "RRTstar"}
+    assert all(row["solved"] == 1 for rows in planners.values() for row in rows.values())

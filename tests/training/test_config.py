@@ -103,7 +103,7 @@ def test_bad_config_files(tmp_path: Path, text: str, message: str) -> None:
 def test_unreadable_config_and_unknown_preset(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="cannot read"):
         TrainingConfig.from_file(tmp_path / "none.yaml")
-    with pytest.raises(ConfigError, match="best, synthetic, paper"):
+    with pytest.raises(ConfigError, match="best, synthetic, refine, paper"):
         TrainingConfig.preset("worst")
 
 

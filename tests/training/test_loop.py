@@ -204,6 +204,80 @@ def test_the_steps_with_discriminators(
     assert with_discriminators == expected
 
 
+@pytest.mark.parametrize(
+    ("options", "symmetries", "reversals", "sizes"),
+    [
+        ({"symmetries": False}, 1, 1, {32}),
+        ({"symmetries": True}, 8, 1, {32}),
+        ({"symmetries": False, "reversal": True}, 1, 2, {32}),
+        ({"symmetries": False, "scales": [1, 2]}, 1, 1, {32, 16}),
+    ],
+)
+def test_what_the_generator_is_trained_on(
+    source: DatasetSource,
+    monkeypatch: pytest.MonkeyPatch,
+    options: dict[str, Any],
+    symmetries: int,
+    reversals: int,
+    sizes: set[int],
+) -> None:
+    config = TINY.updated({"adversarial_weight": 0, **options})
+    gan, cpu = Gan(config, torch.device("cpu")), torch.device("cpu")
+    run = loop.Run(gan, np.random.default_rng(0), torch.Generator().manual_seed(0))
+    seen: list[tuple[torch.Tensor, ...]] = []
+    original = gan.run
+
+    def record(name: str, *inputs: torch.Tensor, trained: bool = True) -> torch.Tensor:
+        seen.append(inputs)
+        return original(name, *inputs, trained=trained)
+
+    monkeypatch.setattr(gan, "run", record)
+    for step in range(40):
+        loop._step(run, config, source.epoch(0), np.zeros(2, np.int64), cpu, step)
+    assert {inputs[0].shape[-1] for inputs in seen} == sizes
+    whole = [inputs for inputs in seen if inputs[0].shape[-1] == 32]
+    points = {image.numpy().tobytes() for inputs in whole for image in inputs[1]}
+    assert len(points) == symmetries * reversals
+    noise = torch.cat([inputs[2].flatten() for inputs in seen])
+    assert abs(float(noise.mean())) < 0.05
+    assert abs(float(noise.std()) - 1) < 0.05
+
+
+def test_learning_rates_of_an_epoch(source: DatasetSource, monkeypatch: pytest.MonkeyPatch) -> None:
+    config = TINY.updated(
+        {"schedule": "exponential", "decay": 0.5, "plateau_patience": 1, "plateau_factor": 0.1}
+    )
+    gan, cpu = Gan(config, torch.device("cpu")), torch.device("cpu")
+    run = loop.Run(gan, np.random.default_rng(0), torch.Generator().manual_seed(0))
+    run.history = [{"validation": {"iou": iou}} for iou in (0.5, 0.4, 0.3)]
+    factors: list[float] = []
+    monkeypatch.setattr(gan, "set_learning_rates", factors.append)
+    loop._train_epoch(run, config, source.epoch(3), cpu, 3, False)
+    assert factors == pytest.approx([0.1 * 0.5**3] * len(factors))
+    assert factors
+
+
+@pytest.mark.parametrize("decay", [0.0, 0.5])
+def test_the_average_is_validated_and_the_best_epoch_kept(
+    source: DatasetSource, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, decay: float
+) -> None:
+    config = TINY.updated({"ema_decay": decay, "epochs": 3})
+    ious = iter((0.2, 0.3, 0.1))
+    validated: list[dict[str, torch.Tensor]] = []
+
+    def evaluate(generator: torch.nn.Module, *_: Any) -> dict[str, float]:
+        validated.append({k: v.clone() for k, v in generator.state_dict().items()})
+        names = ("dice", "precision", "recall", "connectivity")
+        return {"iou": next(ious, 0.0), **dict.fromkeys(names, 0.0)}
+
+    monkeypatch.setattr(loop, "evaluate", evaluate)
+    run = train(source, config, tmp_path, device="cpu", progress=False)
+    assert run["epoch"] == 2
+    state = load_checkpoint(tmp_path / "last.pt")["gan"]
+    assert equal(validated[2], state["average" if decay else "generator"])
+    assert equal(state["average"], state["generator"]) == (decay == 0)
+
+
 def test_segmentation_alone_trains_exports_and_resumes(
     source: DatasetSource, tmp_path: Path
 ) -> None:
