@@ -251,29 +251,25 @@ def test_the_last_valid_state_of_ompl_1() -> None:
     assert LastValid.first.getX() == pytest.approx(55, abs=0.2)
 
 
-@pytest.mark.parametrize("space_name", ["Dubins", "Reeds-Shepp"])
-def test_the_curve_to_the_last_valid_state_touches_nothing(space_name: str) -> None:
-    """It may be another curve than the part of the motion that was checked."""
+def test_the_motion_to_the_last_valid_state_is_valid() -> None:
+    """Reeds-Shepp curves to a state on a curve are another one in half a percent of the cases."""
     grid, robot = make_map(1), ROBOTS["car"]
-    space = with_bounds(SPACES[space_name](), grid)
+    space = with_bounds(SPACES["Reeds-Shepp"](), grid)
     validator = RobotMotionValidator(ob.SpaceInformation(space), grid, robot)
     dense, rng = DenseCheck(grid, robot), np.random.default_rng(2)
     make, poses = States(space), random_poses(grid, rng)
-    moved = 0
-    for _ in range(300):
+    blocked = 0
+    while blocked < 1000:
         start, end = next(poses), next(poses)
+        end[:2] = start[:2] + rng.normal(0, 14, 2)
         if dense.collides(start[None]).any():
             continue
         pair = SimpleNamespace(first=make(0, 0, 0), second=-1.0)
         first = make(*start)
-        if validator.checkMotion(first, make(*end), pair):
-            continue
-        assert 0 <= pair.second < 1
-        moved += pair.second > 0
-        length = space.distance(first, pair.first)
-        steps = steps_of(grid, robot, length, length / 6.0)
-        assert not dense.collides(poses_between(space, first, pair.first, steps)).any()
-    assert moved > 20
+        if not validator.checkMotion(first, make(*end), pair):
+            blocked += 1
+            assert 0 <= pair.second < 1
+            assert validator.checkMotion(first, pair.first)
 
 
 def test_arguments_that_are_none() -> None:
