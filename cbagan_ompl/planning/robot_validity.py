@@ -124,37 +124,24 @@ class RobotMotionValidator(ob.MotionValidator):  # type: ignore[misc]
                 to the last valid state (to within a thousandth of the motion) and how far along
                 the motion it is.
         """
-        if self._curvature is None:
-            free = self._checker.straight_is_free(*self._read(s1), *self._read(s2))
-        else:
-            free = self._is_free(s1, s2, 1.0)
+        free = self._is_free(s1, s2)
         if last_valid and not free:
             self._set_last_valid(last_valid[0], s1, s2)
         return free
 
-    def _is_free(self, s1: Any, s2: Any, part: float) -> bool:
-        """Return whether a motion is free up to a fraction of it."""
+    def _is_free(self, s1: Any, s2: Any) -> bool:
         if self._curvature is None:
-            end = s2
-            if part < 1.0:
-                end = compat.typed_state(self._part_end)
-                self._space.interpolate(s1, s2, part, end)
-            return self._checker.straight_is_free(*self._read(s1), *self._read(end))
-        # Of the poses alone: in a compound space the other parts have a share in the distance.
-        length = self._pose_distance(s1, s2) * part
-        return self._checker.curve_is_free(
-            self._curve(s1, s2, part), length, length * self._curvature
-        )
-
-    def _curve(self, s1: Any, s2: Any, part: float) -> Callable[[float], Pose]:
+            return self._checker.straight_is_free(*self._read(s1), *self._read(s2))
         interpolate, read = self._space.interpolate, self._read
         middle = compat.typed_state(self._middle)
 
         def pose_at(t: float) -> Pose:
-            interpolate(s1, s2, t * part, middle)
+            interpolate(s1, s2, t, middle)
             return read(middle)
 
-        return pose_at
+        # Of the poses alone: in a compound space the other parts have a share in the distance.
+        length = self._pose_distance(s1, s2)
+        return self._checker.curve_is_free(pose_at, length, length * self._curvature)
 
     def _pose_distance(self, s1: Any, s2: Any) -> float:
         space = pose_space(self._space)
@@ -163,10 +150,14 @@ class RobotMotionValidator(ob.MotionValidator):  # type: ignore[misc]
         return float(space.distance(s1[0], s2[0]))
 
     def _set_last_valid(self, last_valid: Any, s1: Any, s2: Any) -> None:
+        # The planner will take the motion to that state for valid, so that motion is checked. It
+        # need not be a part of this one: after rounding, a curve may go another way.
+        part_end = compat.typed_state(self._part_end)
         low, high = 0.0, 1.0
         while high - low > _LAST_VALID_PRECISION:
             middle = (low + high) / 2
-            if self._is_free(s1, s2, middle):
+            self._space.interpolate(s1, s2, middle, part_end)
+            if self._is_free(s1, part_end):
                 low = middle
             else:
                 high = middle

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import pairwise
 from math import inf, pi
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -248,6 +249,27 @@ def test_the_last_valid_state_of_ompl_1() -> None:
     assert not validator.checkMotion(make(10, 20, 0), make(90, 20, 0), LastValid)
     assert pytest.approx(45 / 80, abs=2e-3) == LastValid.second
     assert LastValid.first.getX() == pytest.approx(55, abs=0.2)
+
+
+def test_the_motion_to_the_last_valid_state_is_valid() -> None:
+    """Reeds-Shepp curves to a state on a curve are another one in half a percent of the cases."""
+    grid, robot = make_map(1), ROBOTS["car"]
+    space = with_bounds(SPACES["Reeds-Shepp"](), grid)
+    validator = RobotMotionValidator(ob.SpaceInformation(space), grid, robot)
+    dense, rng = DenseCheck(grid, robot), np.random.default_rng(2)
+    make, poses = States(space), random_poses(grid, rng)
+    blocked = 0
+    while blocked < 1000:
+        start, end = next(poses), next(poses)
+        end[:2] = start[:2] + rng.normal(0, 14, 2)
+        if dense.collides(start[None]).any():
+            continue
+        pair = SimpleNamespace(first=make(0, 0, 0), second=-1.0)
+        first = make(*start)
+        if not validator.checkMotion(first, make(*end), pair):
+            blocked += 1
+            assert 0 <= pair.second < 1
+            assert validator.checkMotion(first, pair.first)
 
 
 def test_arguments_that_are_none() -> None:
