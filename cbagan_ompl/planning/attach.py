@@ -10,7 +10,7 @@ from typing import Any
 
 from ..errors import PlannerError, show
 from ..sampling.adaptation import AdaptiveMixture
-from ..sampling.budget import EARNED_BY_UNIFORM_UNSEEN, LearnedBudget
+from ..sampling.budget import ADVANCE_WITH_TREE, EARNED_BY_UNIFORM_UNSEEN, LearnedBudget
 from ..sampling.heatmap import Heatmap, check_heatmap
 from ..sampling.options import OPTIMIZING_SHARPNESS, SamplerOptions
 from ..sampling.roadmap import RoadmapMixture
@@ -178,7 +178,7 @@ def attach(
     states = state_access(space, rng)
     release_forgotten()
     monitor = _MONITORS.get(hook, PlannerMonitor)(setup, states)
-    budget = _budget_of(planner, name) if options.adaptation.stagnation else None
+    budget = _budget_of(planner, name, hook) if options.adaptation.stagnation else None
     mixture: AdaptiveMixture | RoadmapMixture | None = None
     if hook in _MONITORS:  # callbacks see the tree
         reach = _reach_of(planner)
@@ -240,7 +240,9 @@ def _reach_of(planner: Any) -> float:
     return _REACH * float(range or _OMPL_RANGE * si.getMaximumExtent())
 
 
-def _budget_of(planner: Any, name: str) -> LearnedBudget:
+def _budget_of(planner: Any, name: str, hook: str) -> LearnedBudget:
+    if hook in _MONITORS:
+        return LearnedBudget(advance=ADVANCE_WITH_TREE)
     if stops_at_first(name) or hasattr(planner, "bestCost"):
         return LearnedBudget()
     return LearnedBudget(EARNED_BY_UNIFORM_UNSEEN, is_halved=False)
