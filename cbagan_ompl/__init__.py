@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from .errors import (
     CbaganOmplError,
+    CbaganOmplWarning,
+    ClusterError,
     ConfigError,
     DatasetError,
     HeatmapError,
@@ -41,11 +43,13 @@ if TYPE_CHECKING:
     )
     from .planning.plan import plan
     from .planning.plan_result import PlanResult
+    from .planning.replanner import Replanner
+    from .planning.robot_validity import RobotMotionValidator, RobotValidityChecker
     from .planning.validity import GridMotionValidator, GridValidityChecker
     from .plotting import save_figure
     from .robots.robot import Robot
     from .sampling.heatmap import Heatmap
-    from .sampling.options import Adaptation, SamplerOptions
+    from .sampling.options import Adaptation, HeadingSpread, SamplerOptions
 
 __version__ = "0.2.0"
 
@@ -53,11 +57,14 @@ __all__ = [
     "Adaptation",
     "Attachment",
     "CbaganOmplError",
+    "CbaganOmplWarning",
+    "ClusterError",
     "ConfigError",
     "DatasetError",
     "GridMap",
     "GridMotionValidator",
     "GridValidityChecker",
+    "HeadingSpread",
     "Heatmap",
     "HeatmapError",
     "HeatmapStateSampler",
@@ -68,8 +75,11 @@ __all__ = [
     "PlanResult",
     "PlannerError",
     "Predictor",
+    "Replanner",
     "Robot",
     "RobotError",
+    "RobotMotionValidator",
+    "RobotValidityChecker",
     "SamplerOptions",
     "Task",
     "TaskError",
@@ -94,17 +104,19 @@ _HOMES = {
     "planning.hooks": ("reached_planners",),
     "planning.plan": ("plan",),
     "planning.plan_result": ("PlanResult",),
+    "planning.replanner": ("Replanner",),
     "planning.ompl_samplers": (
         "HeatmapStateSampler",
         "HeatmapValidStateSampler",
         "state_sampler_allocator",
         "valid_state_sampler_allocator",
     ),
+    "planning.robot_validity": ("RobotMotionValidator", "RobotValidityChecker"),
     "planning.validity": ("GridMotionValidator", "GridValidityChecker"),
     "plotting": ("save_figure",),
     "robots.robot": ("Robot",),
     "sampling.heatmap": ("Heatmap",),
-    "sampling.options": ("Adaptation", "SamplerOptions"),
+    "sampling.options": ("Adaptation", "HeadingSpread", "SamplerOptions"),
 }
 protect_exit()
 

@@ -1,4 +1,4 @@
-"""The exceptions of cbagan_ompl: one root, one class for each thing a user can get wrong."""
+"""The exceptions of cbagan_ompl, one class for each thing a user can get wrong, and its warning."""
 
 from __future__ import annotations
 
@@ -25,6 +25,18 @@ class CbaganOmplError(Exception):
         ... except CbaganOmplError as error:
         ...     print(type(error).__name__, "-", str(error).split(";")[0])
         MapError - no map 'palace' is bundled
+    """
+
+    def __init__(self, message: object = "") -> None:
+        super().__init__(_plain(str(message)))
+
+
+class CbaganOmplWarning(UserWarning):
+    """An input that is used as it is, though it is probably not what was meant.
+
+    Args:
+        message: what is odd, with the value, and what to do; it is shortened and escaped as that of
+            a :class:`CbaganOmplError`.
     """
 
     def __init__(self, message: object = "") -> None:
@@ -61,6 +73,10 @@ class PlannerError(CbaganOmplError):
 
 class ConfigError(CbaganOmplError):
     """An option with a value that makes no sense, or an unknown option."""
+
+
+class ClusterError(CbaganOmplError):
+    """A cluster that cannot be reached, or whose workers cannot do the work."""
 
 
 class MissingDependencyError(CbaganOmplError):

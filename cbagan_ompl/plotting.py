@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -26,7 +26,10 @@ from .common.figures import (
     mark_endpoints,
     write_figure,
 )
+from .common.files import as_path
 from .common.text import one_line
+from .errors import ConfigError, show
+from .maps.checks import check_grid
 from .maps.grid_map import GridMap
 
 if TYPE_CHECKING:
@@ -46,6 +49,10 @@ _PADDING, _LEAST_PADDING = 0.03, 3
 _WIDEST, _THINNEST, _WIDTH_OF_ONE = 0.6, 0.12, 20.0
 
 _MOST_TICKS = 8
+
+# Length of an arrow for a heading, pixels of the map; least distance between two poses that are
+# shown, as a fraction of the map's longer side.
+_ARROW, _LEAST_APART = 8.0, 0.03
 
 _LONGEST_NAME = 60  # of a map, characters of the headline
 
@@ -73,7 +80,12 @@ def save_figure(
         >>> with tempfile.NamedTemporaryFile(suffix=".png") as file:
         ...     save_figure(result, grid, file.name)
     """
-    check_figure_path(path)
+    from .planning.plan_result import PlanResult
+
+    if not isinstance(result, PlanResult):
+        raise ConfigError(f"save_figure draws the result of plan, got {show(result)}")
+    check_grid(grid)
+    check_figure_path(as_path(path, ConfigError))
     write_figure(make_figure(result, grid, show_tree=show_tree), path)
 
 
@@ -116,8 +128,11 @@ def draw_plan(
     if show_tree and result.tree is not None and len(result.tree):
         handles.append(_draw_tree(axes, grid.to_pixel(result.tree)))
     if result.solved:
-        handles.append(_draw_path(axes, grid.to_pixel(result.path)))
-    handles += mark_endpoints(axes, grid.to_pixel(result.start), grid.to_pixel(result.goal))
+        handles.append(_draw_path(axes, grid.to_pixel(result.trajectory[:, :2])))
+    if result.robot.has_heading:
+        handles += _draw_poses(axes, result, grid)
+    start, goal = (grid.to_pixel(endpoint[:2]) for endpoint in (result.start, result.goal))
+    handles += mark_endpoints(axes, start, goal)
     left, top, right, bottom = _visible_box(grid)
     axes.set(xlim=(left, right), ylim=(bottom, top), xticks=[], yticks=[])
     return handles
@@ -177,6 +192,44 @@ def _draw_path(axes: Axes, path: NDArray[np.float64]) -> Line2D:
     axes.plot(*path.T, color="white", linewidth=4.5, solid_capstyle="round")
     (line,) = axes.plot(*path.T, color=BLACK, linewidth=2.2, label="path")
     return line
+
+
+def _draw_poses(axes: Axes, result: PlanResult, grid: GridMap) -> list[Artist]:
+    """Draw the robot's outline along the path, or arrows where it has none, and at both ends."""
+    poses = _spread_poses(result, grid)
+    if result.robot.vertices is None:
+        ahead = poses[:, :2] + _ARROW * grid.resolution * _directions(poses)
+        tips, tails = grid.to_pixel(ahead), grid.to_pixel(poses[:, :2])
+        axes.quiver(
+            *tails.T, *(tips - tails).T, angles="xy", scale_units="xy", scale=1, color=BLACK,
+            width=0.003,
+        )  # fmt: skip
+        return []
+    outlines = [grid.to_pixel(result.robot.outline(pose)) for pose in poses]
+    axes.add_collection(
+        PolyCollection(outlines, facecolors="none", edgecolors=BLACK, linewidths=0.7, alpha=0.7)
+    )
+    # The front of a robot is where its heading points.
+    noses = poses[:, :2] + result.robot.circumscribed_radius * _directions(poses)
+    lines = np.stack((grid.to_pixel(poses[:, :2]), grid.to_pixel(noses)), axis=1)
+    axes.add_collection(LineCollection(list(lines), colors=BLACK, linewidths=0.7, alpha=0.7))
+    return [Patch(facecolor="none", edgecolor=BLACK, label="footprint")]
+
+
+def _spread_poses(result: PlanResult, grid: GridMap) -> NDArray[np.float64]:
+    """Return poses along the path that lie apart, both ends among them, (K, 3), world."""
+    if not result.solved:
+        return np.array([result.start, result.goal])
+    trajectory = result.trajectory
+    apart = max(2 * result.robot.circumscribed_radius, _LEAST_APART * max(grid.shape))
+    along = np.concatenate(([0.0], np.hypot(*np.diff(trajectory[:, :2], axis=0).T).cumsum()))
+    count = max(2, round(float(along[-1]) / apart) + 1)
+    chosen = np.searchsorted(along, np.linspace(0, along[-1], count))
+    return np.asarray(trajectory[np.minimum(chosen, len(trajectory) - 1)])
+
+
+def _directions(poses: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.stack((np.cos(poses[:, 2]), np.sin(poses[:, 2])), axis=-1)
 
 
 def _label_axes(axes: Axes, grid: GridMap) -> None:

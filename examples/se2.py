@@ -1,4 +1,4 @@
-"""Plan for a pose (x, y, yaw): the position is sampled from the heat map, the heading uniformly.
+"""Plan for a pose (x, y, yaw): position and heading are sampled from the heat map.
 
     python examples/se2.py
 

@@ -20,7 +20,8 @@ from cbagan_ompl.benchmarking.logs import parse_log
 from cbagan_ompl.planning import compat
 from cbagan_ompl.planning.compat import og, ou
 from cbagan_ompl.planning.ompl_benchmark import PlannerVariant, RunOptions, run_benchmark
-from cbagan_ompl.planning.problem import Endpoints, make_setup
+from cbagan_ompl.planning.problem import make_setup
+from cbagan_ompl.planning.workspace import Endpoints, Workspace
 
 MAP, RANGE = "bundled:walls_with_gaps", 20.0
 
@@ -47,7 +48,7 @@ def main() -> None:
 def inside(grid: GridMap, task: Endpoints, time: float, seed: int) -> tuple[int, float]:
     options = RunOptions(1, time, RANGE, grid.resolution, SamplerOptions(seed=seed))
     recording = run_benchmark(
-        "x", grid, task, [PlannerVariant("RRTstar", "uniform", None)], options
+        "x", Workspace(grid), task, [PlannerVariant("RRTstar", "uniform", None)], options
     )
     run = parse_log(recording.logs[0]).planners[0].runs[0]
     return int(run["iterations INTEGER"]), float(run["time REAL"])
@@ -56,7 +57,7 @@ def inside(grid: GridMap, task: Endpoints, time: float, seed: int) -> tuple[int,
 def outside(grid: GridMap, task: Endpoints, time: float, seed: int) -> int:
     with compat.log_level(ou.LOG_ERROR):
         compat.seed_ompl(seed)
-        setup = make_setup(grid, task, grid.resolution)
+        setup = make_setup(Workspace(grid), task, grid.resolution)
         planner = og.RRTstar(setup.getSpaceInformation())
         planner.setRange(RANGE)
         setup.setPlanner(planner)

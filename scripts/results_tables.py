@@ -12,10 +12,11 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+
+from planner_tables import RATIOS_WITH_FIRST, Json, planners_table
+from search_speed import speed_table
 
 from cbagan_ompl.common.files import make_folder, write_atomically
 from cbagan_ompl.common.markdown import table
@@ -26,22 +27,6 @@ OUTPUT = ROOT / "docs" / "results" / "generated"
 VERSIONS = ("2.0.1", "1.7.0")
 #: What the bundled model is trained on.
 BUNDLED_LABEL = "exact, 5%"
-
-#: Columns of the tables of planners and samplers: ratios to OMPL's own sampler, by their names.
-RATIOS = {
-    "nodes": "nodes",
-    "within_5_percent_s": "to 5 %",
-    "within_5_percent_total_s": "with inference",
-}
-RATIOS_WITH_FIRST = {
-    "nodes": "nodes",
-    "first_solution_s": "first path",
-    "first_solution_total_s": "with inference",
-    "within_5_percent_s": "to 5 %",
-    "within_5_percent_total_s": "with inference",
-}
-
-Json = Mapping[str, Any]
 
 
 def main() -> None:
@@ -65,55 +50,6 @@ def read(path: str | Path) -> Json:
     """Return the content of a JSON file; a relative path begins in benchmarks/results."""
     content: Json = json.loads((RESULTS / path).read_text(encoding="utf-8"))
     return content
-
-
-def planners_table(
-    summaries: Sequence[Json],
-    ratios: Mapping[str, str] = RATIOS,
-    samplers: Sequence[str] | None = None,
-) -> str:
-    """Return the table of planners and samplers, for several versions of OMPL side by side.
-
-    Args:
-        summaries: the ``summary.json`` of a benchmark, once for each version of OMPL.
-        ratios: the measures that are shown, and the names of their columns.
-        samplers: that are shown, in this order; all but OMPL's own by default.
-    """
-    header = ["planner", "sampler"]
-    rows: dict[tuple[str, str], list[str]] = {}
-    for summary in summaries:
-        header += [f"{summary['ompl_version']}: solved", *ratios.values()]
-        own = {row["planner"]: row for row in summary["overall"] if not row["ratios"]}
-        for row in summary["overall"]:
-            if row["ratios"] and (samplers is None or row["sampler"] in samplers):
-                cells = rows.setdefault((row["planner"], row["sampler"]), [])
-                cells += ratio_cells(row, own[row["planner"]], ratios)
-    planners = list(dict.fromkeys(planner for planner, _ in rows))
-    order = list(samplers or dict.fromkeys(sampler for _, sampler in rows))
-    names = sorted(rows, key=lambda name: (planners.index(name[0]), order.index(name[1])))
-    return table(header, [[*name, *rows[name]] for name in names])
-
-
-def ratio_cells(row: Json, own: Json, ratios: Mapping[str, str]) -> list[str]:
-    """Return how many runs were solved, by OMPL's own sampler and by this one, and the ratios."""
-    shown = [
-        # Where most runs of both end at the limit, a ratio of limits would say nothing.
-        "-"
-        if row["censored"][measure] >= 0.5 <= own["censored"][measure]
-        else interval_of(row["ratios"][measure])
-        for measure in ratios
-    ]
-    return [f"{own['success']:.0%} / {row['success']:.0%}", *shown]
-
-
-def interval_of(interval: Mapping[str, float | None]) -> str:
-    median, low, high = (ratio_text(interval[key]) for key in ("median", "low", "high"))
-    return f"{median} [{low}, {high}]"
-
-
-def ratio_text(value: float | None) -> str:
-    """Return a ratio; a missing one is infinite: more than half of the runs did not get there."""
-    return "∞" if value is None or math.isinf(value) else f"{value:.2f}"
 
 
 def real_maps() -> str:
@@ -324,6 +260,23 @@ def paper_tables() -> str:
     return table(["", "sampler", "nodes", "planning", "inference"], rows)
 
 
+def replanning() -> str:
+    scenes = {"static": "none", "obstacles": "appear"}
+    variants = {"uniform": "OMPL's own sampler", "fresh": "predicted anew", "kept": "Replanner"}
+    rows = []
+    for maps in ("bundled", "real_maps"):
+        results = read(f"replanning_{maps}.json")
+        name = f"{maps.replace('_', ' ')}, {results['tasks']} tasks"
+        for scene, obstacles in scenes.items():
+            for variant, heatmap in variants.items():
+                values = results[scene][variant]
+                times = [f"{values[key]:.1f} ms" for key in ("median_ms", "p95_ms")]
+                shares = [f"{100 * values[key]:.1f} %" for key in ("in_time", "kept")]
+                rows.append([name, obstacles, heatmap, *times, *shares])
+    header = ["maps", "obstacles", "heat map", "median", "95 % within", "path in 100 ms", "kept"]
+    return table(header, rows)
+
+
 #: What makes each table, by the name of its file.
 TABLES: dict[str, Callable[[], str]] = {
     "unseen_maps_connectivity": unseen_maps_connectivity,
@@ -339,6 +292,8 @@ TABLES: dict[str, Callable[[], str]] = {
     "paper_tables": paper_tables,
     "paper_tasks": paper_tasks,
     "bundled_maps": bundled_maps,
+    "replanning": replanning,
+    "search_speed": lambda: speed_table(read("search_speed.json")),
 }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import re
 import shlex
 import subprocess
@@ -155,8 +156,29 @@ def test_table_of_hooks() -> None:
     assert reached == reached_planners()
 
 
+def test_figures_of_replanning_are_those_of_the_result_files() -> None:
+    results = DOCS.parent / "benchmarks" / "results"
+    scenes = [
+        json.loads((results / f"replanning_{maps}.json").read_text())[scene]
+        for maps in ("bundled", "real_maps")
+        for scene in ("static", "obstacles")
+    ]
+    text = " ".join((RECIPES / "replanning.md").read_text(encoding="utf-8").split())
+    for variant, sentence in (
+        ("kept", r"cycle: ([\d.]+) to ([\d.]+) ms in the median"),
+        ("fresh", r"prediction takes ([\d.]+) to ([\d.]+) ms"),
+    ):
+        (said,) = re.findall(sentence, text)
+        medians = [scene[variant]["median_ms"] for scene in scenes]
+        assert said == (f"{min(medians):.1f}", f"{max(medians):.1f}")
+    (said,) = re.findall(r"take (\d+) ms or more, with the `Replanner` (\d+) to (\d+) ms", text)
+    uniform, kept = ([scene[of]["p95_ms"] for scene in scenes] for of in ("uniform", "kept"))
+    assert said == (f"{int(min(uniform))}", f"{min(kept):.0f}", f"{max(kept):.0f}")
+    assert all(scene["uniform"]["median_ms"] < scene["kept"]["median_ms"] for scene in scenes)
+
+
 def test_every_included_table_is_there() -> None:
-    for page in (DOCS / "results").glob("*.md"):
+    for page in [*(DOCS / "results").glob("*.md"), *RECIPES.glob("*.md")]:
         for name in re.findall(r"\{include\} (\S+)", page.read_text(encoding="utf-8")):
             assert (page.parent / name).is_file(), name
 

@@ -13,20 +13,26 @@ import pytest
 
 import cbagan_ompl
 from cbagan_ompl import errors
-from cbagan_ompl.errors import CbaganOmplError, MapError, show
+from cbagan_ompl.errors import CbaganOmplError, CbaganOmplWarning, MapError, show
 
 CLASSES = [
     value
     for value in vars(errors).values()
-    if isinstance(value, type) and issubclass(value, Exception)
+    if isinstance(value, type) and issubclass(value, Exception) and not issubclass(value, Warning)
 ]
 
 
 def test_every_class_has_one_root_and_is_public() -> None:
-    assert len(CLASSES) == 10
+    assert len(CLASSES) == 11
     for one in CLASSES:
         assert issubclass(one, CbaganOmplError)
         assert getattr(cbagan_ompl, one.__name__) is one
+
+
+def test_warnings_are_shown_as_errors_are() -> None:
+    assert issubclass(CbaganOmplWarning, UserWarning)
+    assert cbagan_ompl.CbaganOmplWarning is CbaganOmplWarning
+    assert str(CbaganOmplWarning("map \x1b")) == str(MapError("map \x1b")) == r"map \x1b"
 
 
 def test_short_messages_stay_as_they_are() -> None:

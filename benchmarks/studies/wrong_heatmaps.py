@@ -27,6 +27,7 @@ from cbagan_ompl.planning import compat
 from cbagan_ompl.planning.compat import ompl_version, planner_class
 from cbagan_ompl.planning.hooks import hangs_on_python_termination, stops_at_first
 from cbagan_ompl.planning.problem import make_setup, set_range
+from cbagan_ompl.planning.workspace import Workspace
 
 SIDE, START, GOAL, RANGE = 256, (10.0, 10.0), (240.0, 240.0), 20.0
 # Runs end after so many iterations, or seconds where iterations cannot be limited.
@@ -135,7 +136,7 @@ def first_path(
 ) -> tuple[float, bool]:
     """Return the iterations of a planner to its first path, after which it would go on."""
     compat.seed_ompl(seed)
-    setup = make_setup(grid, grid.check_task(START, GOAL), 1.0)
+    setup = make_setup(Workspace(grid), grid.check_task(START, GOAL), 1.0)
     instance = planner_class(planner)(setup.getSpaceInformation())
     set_range(instance, limits["range"])
     setup.setPlanner(instance)

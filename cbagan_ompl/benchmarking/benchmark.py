@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ..common.files import make_folder, write_atomically, write_json
+from ..common.parallel import Executor, LocalExecutor
 from ..errors import ConfigError
 from .database import write_database
 from .inputs import check_same, record_inputs
 from .logs import ExperimentLog, read_log
 from .measures import thresholds
 from .plots import save_plots
+from .remote import run_jobs_remotely
 from .report import Conditions, markdown, summary_json
 from .runner import run_jobs
 from .settings import Settings
@@ -72,10 +75,27 @@ class Benchmark:
         make_folder(logs)
         write_json(saved, record)
 
-    def run(self, processes: int, show_progress: bool = True) -> dict[str, str]:
-        """Run the tasks that have no log yet; arguments and result as for :func:`.run_jobs`."""
+    def run(self, executor: Executor, show_progress: bool = True) -> dict[str, str]:
+        """Run the tasks that have no log yet, each in a process of its own.
+
+        Args:
+            executor: where they run.
+            show_progress: show a progress bar with the remaining time.
+
+        Returns:
+            For each task that failed, by its name, the end of its output.
+
+        Raises:
+            KeyboardInterrupt: after an interrupt; the tasks that were running are terminated.
+            ConfigError: processes or temporary files cannot be made, or a log cannot be written.
+            ModelError: a model cannot be read.
+            HeatmapError: a heat map cannot be read.
+            ClusterError: the cluster cannot do the work.
+        """
         remaining = [job for job in self._jobs if not os.path.lexists(job.log)]
-        return run_jobs(remaining, processes, show_progress)
+        if isinstance(executor, LocalExecutor):
+            return run_jobs(remaining, executor.processes, show_progress)
+        return run_jobs_remotely(remaining, executor, show_progress)
 
     def finished_logs(self, failures: Mapping[str, str]) -> list[ExperimentLog]:
         """Return the logs of the tasks that have been run.
@@ -140,7 +160,8 @@ def write_results(
         )
     write_database(logs, folder / "benchmark.db")
     results = results_of(logs, thresholds(settings.within))
-    conditions = Conditions(next(iter(versions)), len(logs), settings, failures, command)
+    hosts = Counter(log.host for log in logs)
+    conditions = Conditions(next(iter(versions)), len(logs), settings, failures, command, hosts)
     write_json(folder / "summary.json", summary_json(results, conditions))
     report = markdown(results, conditions)
     write_atomically(folder / "summary.md", report)

@@ -11,7 +11,7 @@ from typing import Any
 from .. import __version__
 from ..common.files import read_bytes, read_text
 from ..errors import ConfigError, HeatmapError, ModelError, show
-from ..planning.heatmap_sources import LEARNED
+from ..planning.heatmap_sources import AUTO, LEARNED
 from .settings import Settings
 from .tasks import BenchmarkTask, heatmap_path
 
@@ -48,7 +48,7 @@ def record_inputs(tasks: Sequence[BenchmarkTask], settings: Settings) -> dict[st
         "ompl_version": ompl_version(),
         "model_hashes": {
             sampler: _hash(read_bytes(path, ModelError))
-            for sampler, path in sorted(_models(settings).items())
+            for sampler, path in sorted(model_files(settings).items())
         },
         "maps": {task.map_name: _describe_map(task) for task in tasks},
         "tasks": {task.name: _describe_task(task, settings) for task in tasks},
@@ -99,17 +99,18 @@ def _differences(there: Any, now: Any, place: str = "") -> Iterator[str]:
         yield f"{place} is {show(there)} there and {show(now)} now"
 
 
-def _models(settings: Settings) -> dict[str, Path]:
-    models = {sampler: Path(path) for sampler, path in settings.models.items()}
-    if LEARNED in set(settings.samplers) - set(models) - set(settings.heatmap_dirs):
-        from ..inference.model_files import bundled_model
+def model_files(settings: Settings) -> dict[str, Path]:
+    """Return the file of the model of each sampler that has one, the bundled model included."""
+    from ..inference.model_files import find_model
 
-        models[LEARNED] = bundled_model()
-    return models
+    models: dict[str, str | None] = dict(settings.models)
+    if {LEARNED, AUTO} & set(settings.samplers) - set(models) - set(settings.heatmap_dirs):
+        models[LEARNED] = None
+    return {sampler: find_model(model) for sampler, model in models.items()}
 
 
 def _describe_map(task: BenchmarkTask) -> dict[str, Any]:
-    grid = task.grid
+    grid = task.workspace.source
     return {
         "width": grid.width,
         "height": grid.height,
@@ -120,10 +121,9 @@ def _describe_map(task: BenchmarkTask) -> dict[str, Any]:
 
 
 def _describe_task(task: BenchmarkTask, settings: Settings) -> dict[str, Any]:
-    (start_x, start_y), (goal_x, goal_y) = task.task.start, task.task.goal
     described: dict[str, Any] = {
-        "start": [float(start_x), float(start_y)],
-        "goal": [float(goal_x), float(goal_y)],
+        "start": [float(value) for value in task.task.start],
+        "goal": [float(value) for value in task.task.goal],
         "optimal_cost": task.task.optimal_cost,
         "family": task.task.family,
     }

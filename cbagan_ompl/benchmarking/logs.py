@@ -19,6 +19,9 @@ from .log_lines import BLOCK_BEGIN, BLOCK_END, FINITE, MAX_LOG_BYTES, NUMBER, Lo
 #: OMPL's logs put this before the name of a geometric planner.
 GEOMETRIC = "geometric_"
 
+#: Separates the hosts of a log whose runs were done on several.
+HOSTS = ", "
+
 
 @dataclass(frozen=True)
 class PlannerLog:
@@ -47,7 +50,7 @@ class ExperimentLog:
         version: ``"OMPL version 2.0.1"``.
         name: name of the experiment, without blanks.
         parameters: properties of the experiment, ``"map VARCHAR"`` -> text.
-        host: name of the machine.
+        host: name of the machine; several with :data:`HOSTS` between them.
         date: time at which the experiment began.
         setup: OMPL's description of the problem.
         cpu: OMPL's description of the processor, empty where it gives none.
@@ -171,6 +174,7 @@ def concatenate_logs(logs: Sequence[ExperimentLog]) -> ExperimentLog:
     first = logs[0]
     return replace(
         first,
+        host=HOSTS.join(dict.fromkeys(log.host for log in logs)),
         runs=sum(log.runs for log in logs),
         total_time=sum(log.total_time for log in logs),
         planners=tuple(

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from math import isfinite
 from typing import Any
 
 from ..common.markdown import table
 from ..common.text import one_line
+from .logs import HOSTS
 from .settings import BASELINE, Settings
 from .statistics import Interval, Results, Summary, within_key
 
@@ -37,6 +38,7 @@ class Conditions:
         settings: what was compared.
         failures: for each task that failed the end of its output.
         command: command that repeats the benchmark.
+        hosts: number of tasks that each host has run, by its name.
     """
 
     ompl_version: str
@@ -44,6 +46,35 @@ class Conditions:
     settings: Settings
     failures: Mapping[str, str]
     command: str
+    hosts: Mapping[str, int] = field(default_factory=dict)
+
+
+def warn_of_hosts(hosts: Mapping[str, int]) -> str:
+    """Return a warning where tasks were run on different hosts, nothing where one ran them all.
+
+    Args:
+        hosts: number of tasks by host; that of a task whose runs were done on several names them,
+            with :data:`.logs.HOSTS` between.
+
+    Example:
+        >>> warn_of_hosts({"alpha": 4})
+        ''
+        >>> print(warn_of_hosts({"alpha": 1, "beta": 2}))
+        the tasks were run on several hosts (alpha: 1, beta: 2): ratios, which compare samplers on
+        one task, hold; times are those of different machines
+    """
+    if len(hosts) < 2 and not any(HOSTS in host for host in hosts):
+        return ""
+    counted = ", ".join(f"{one_line(host)}: {count}" for host, count in sorted(hosts.items()))
+    if any(HOSTS in host for host in hosts):
+        return (
+            f"runs on one task were done on several hosts ({counted}): neither times nor ratios\n"
+            "compare samplers"
+        )
+    return (
+        f"the tasks were run on several hosts ({counted}): ratios, which compare samplers on\n"
+        "one task, hold; times are those of different machines"
+    )
 
 
 def summary_json(results: Results, conditions: Conditions) -> dict[str, Any]:
@@ -51,6 +82,7 @@ def summary_json(results: Results, conditions: Conditions) -> dict[str, Any]:
     return {
         "ompl_version": conditions.ompl_version,
         "tasks": conditions.tasks,
+        "hosts": dict(conditions.hosts),
         "settings": conditions.settings.to_dict(),
         "failures": dict(conditions.failures),
         "command": conditions.command,
@@ -74,6 +106,7 @@ def markdown(results: Results, conditions: Conditions) -> str:
         f"OMPL {conditions.ompl_version}, {conditions.tasks} tasks, {settings.runs} runs of "
         f"each planner with each sampler on each, {settings.time:g} s a run.",
         f"    {conditions.command}",
+        *filter(None, [warn_of_hosts(conditions.hosts).capitalize()]),
         "## Results",
         _measures_table(results.overall, settings.within),
         _NOTES,

@@ -14,11 +14,11 @@ from typing import cast
 from tqdm import tqdm
 
 from ..common.files import reason
-from ..common.parallel import fork_server, start_first
+from ..common.parallel import fork_server, start_first, why_died
 from ..common.signals import interrupts_held
 from ..common.text import one_line
 from ..errors import ConfigError
-from ..planning.heatmap_sources import LEARNED
+from ..planning.heatmap_sources import AUTO, LEARNED
 from .worker import Job, UnwritableLogError, run_job
 
 # Imported once, by the server from which the processes are forked.
@@ -118,7 +118,7 @@ class _RunningJob:
     """
 
     def __init__(self, job: Job, folder: Path) -> None:
-        learned = LEARNED in job.settings.samplers or job.settings.models
+        learned = {LEARNED, AUTO} & set(job.settings.samplers) or job.settings.models
         context = fork_server([*_PRELOAD, *(_PRELOAD_LEARNED if learned else ())])
         self.job = job
         self.rounds_left = job.settings.runs
@@ -131,10 +131,13 @@ class _RunningJob:
     def start(self, interrupted: Connection | None) -> None:
         """Start the process; an interrupt is waited for with the first one only."""
         with self._writer:  # the process holds its own copy, whose end is the end of the pipe
-            if interrupted is None:
-                self.process.start()
-            else:
-                start_first(self.process, interrupted)
+            try:
+                if interrupted is None:
+                    self.process.start()
+                else:
+                    start_first(self.process, interrupted)
+            except BrokenPipeError as error:
+                raise _death() from error
 
     def rounds_done(self) -> int:
         """Return 1 for a round that is done, 0 when the process has ended."""
@@ -157,8 +160,15 @@ class _RunningJob:
         output = self._output.read_text(encoding="utf-8", errors="replace")
         if code == _CANNOT_WRITE:
             return output.strip() or f"cannot write {self.job.log}"
+        if not output and code == 1:  # it did not come to its work
+            raise _death()
         end = f"ended by {signal.Signals(-code).name}" if code < 0 else ""
         return f"{output[-_OUTPUT_KEPT:]}\n{end}".strip() or f"exit status {code}"
+
+
+def _death() -> ConfigError:
+    """Return the error for a process that never came to its job."""
+    return ConfigError(f"a process that runs a task has died, {why_died()}")
 
 
 def _work(job: Job, rounds: Connection, output: Path) -> None:

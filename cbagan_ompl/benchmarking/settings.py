@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 from ..common.validation import is_finite_number, positive_number, whole_number
@@ -13,6 +13,7 @@ from ..common.yaml_text import parse_yaml
 from ..errors import ConfigError, show
 from ..planning.heatmap_sources import LEARNED, UNIFORM
 from ..planning.planner_names import planner_name
+from ..robots.robot import Robot
 from ..sampling.options import SamplerOptions
 
 #: OMPL's own sampler, which the others are compared with.
@@ -47,7 +48,7 @@ class Settings:
         models: for some samplers the file of the model that makes their heat maps; the bundled one
             for ``learned`` by default.
         heatmap_dirs: for some samplers the folder of their heat maps, one for each task.
-        radius: radius of the robot, world units.
+        robot: what moves.
         within: threshold of a good path, in percent above the best known cost: reports and plots
             show the time until a run gets there.
 
@@ -69,7 +70,7 @@ class Settings:
     sampler_options: SamplerOptions = field(default_factory=lambda: SamplerOptions(seed=0))
     models: Mapping[str, str] = field(default_factory=dict)
     heatmap_dirs: Mapping[str, str] = field(default_factory=dict)
-    radius: float = 0.0
+    robot: Robot = field(default_factory=Robot.point)
     within: int = DEFAULT_WITHIN
 
     def __post_init__(self) -> None:
@@ -126,6 +127,9 @@ class Settings:
                 saved["adaptation"] = list(self.sampler_options.adaptation.names)
                 saved["sharpness"] = self.sampler_options.sharpness
                 saved["seed"] = self.seed
+                saved["heading"] = asdict(self.sampler_options.heading)
+            elif name == "robot":
+                saved[name] = asdict(self.robot)
             else:
                 saved[name] = getattr(self, name)
         return json.loads(json.dumps(saved))  # type: ignore[no-any-return]

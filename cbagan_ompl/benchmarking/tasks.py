@@ -19,6 +19,8 @@ from ..errors import ConfigError, HeatmapError, TaskError
 from ..maps.grid_map import GridMap
 from ..maps.loading import BUNDLED, bundled_maps
 from ..maps.tasks import Task, load_tasks, tasks_of
+from ..planning.workspace import Workspace
+from ..robots.robot import Robot
 from ..sampling.heatmap import Heatmap
 
 # Start and goal of a random task are at least this fraction of the map's longer side apart.
@@ -37,14 +39,19 @@ class BenchmarkTask:
     """A task on its map.
 
     Attributes:
-        grid: the map, inflated by the robot's radius.
+        workspace: the robot on the map.
         number: number of the task among those of its map, from 0.
         task: the task.
     """
 
-    grid: GridMap
+    workspace: Workspace
     number: int
     task: Task
+
+    @property
+    def grid(self) -> GridMap:
+        """The map of the robot's positions, which heat maps lie on."""
+        return self.workspace.grid
 
     @property
     def map_name(self) -> str:
@@ -61,7 +68,7 @@ def select_tasks(
     maps: Sequence[str],
     tasks: str | None = None,
     tasks_per_map: int | None = None,
-    radius: float = 0.0,
+    robot: Robot | None = None,
     seed: int = 0,
     map_options: Mapping[str, Any] | None = None,
 ) -> list[BenchmarkTask]:
@@ -72,7 +79,7 @@ def select_tasks(
         tasks: a ``.csv`` or ``.scen`` file, see :func:`cbagan_ompl.load_tasks`.
         tasks_per_map: at most so many of each map, spread evenly over its list; the number of
             random ones for a map without tasks.
-        radius: radius of the robot, world units.
+        robot: what moves, a point by default.
         seed: seed of random tasks.
         map_options: keyword arguments of :meth:`GridMap.load`.
 
@@ -87,17 +94,20 @@ def select_tasks(
     for path in maps or [BUNDLED + name for name in bundled_maps()]:
         loaded = GridMap.load(path, **(map_options or {}))
         # By the name of the file: that of an inflated map says so.
-        given = tasks_of(path, loaded) if tasks is None else load_tasks(tasks, loaded)
-        grid = loaded.inflated(radius)
+        workspace = Workspace(loaded, robot or Robot.point())
+        if tasks is None:
+            given = tasks_of(path, loaded, with_yaw=workspace.robot.has_heading)
+        else:
+            given = load_tasks(tasks, loaded)
         if not given:
-            given = random_tasks(grid, tasks_per_map or _RANDOM_TASKS, seed)
+            given = random_tasks(workspace, tasks_per_map or _RANDOM_TASKS, seed)
         for number in _spread(len(given), tasks_per_map):
             task = given[number]
             try:
-                grid.check_task(task.start, task.goal)
+                workspace.check_task(task.start, task.goal)
             except TaskError as error:
-                raise TaskError(f"task {number} of {grid.name}: {error}") from error
-            selected.append(BenchmarkTask(grid, number, task))
+                raise TaskError(f"task {number} of {loaded.name}: {error}") from error
+            selected.append(BenchmarkTask(workspace, number, task))
     if len(selected) > MAX_TASKS:
         raise ConfigError(
             f"a benchmark has at most {MAX_TASKS} tasks, these are {len(selected)}; choose some "
@@ -120,19 +130,21 @@ def _spread(count: int, most: int | None) -> list[int]:
     return numbers
 
 
-def random_tasks(grid: GridMap, count: int, seed: int) -> list[Task]:
+def random_tasks(workspace: Workspace, count: int, seed: int) -> list[Task]:
     """Return tasks between random connected free pixels, at least half the map apart.
 
-    The same map and seed give the same tasks.
+    The headings of robots that have one are uniform. The same map, robot and seed give the same
+    tasks.
 
     Args:
-        grid: the map, inflated by the robot's radius.
+        workspace: the robot on the map.
         count: number of tasks.
         seed: at least 0.
 
     Raises:
         TaskError: the map has none or too few such pairs of pixels.
     """
+    grid = workspace.grid
     name = grid.name.encode(errors="surrogateescape")
     rng = np.random.default_rng((seed, crc32(name), crc32(grid.cells)))
     rows, columns = np.nonzero(grid.free)
@@ -145,15 +157,26 @@ def random_tasks(grid: GridMap, count: int, seed: int) -> list[Task]:
         tries += 1
         i, j = rng.integers(len(points), size=2)
         if labels[i] == labels[j] and np.hypot(*(points[i] - points[j])) >= least:
-            (x0, y0), (x1, y1) = points[i].tolist(), points[j].tolist()
-            tasks.append(Task((x0, y0), (x1, y1)))
-            tries = 0
+            start, goal = (_with_heading(workspace, points[k].tolist(), rng) for k in (i, j))
+            if start is not None and goal is not None:
+                tasks.append(Task(start, goal))
+                tries = 0
         if len(tasks) == count:
             return tasks
     raise TaskError(
         f"{grid.name}: found no {count} tasks of at least {least:g} between connected free "
         "pixels; give tasks of your own"
     )
+
+
+def _with_heading(
+    workspace: Workspace, point: list[float], rng: np.random.Generator
+) -> tuple[float, ...] | None:
+    """Return a position with a random heading where the robot has one; None where it collides."""
+    if not workspace.robot.has_heading:
+        return tuple(point)
+    pose = *point, float(rng.uniform(-np.pi, np.pi))
+    return pose if workspace.checker.pose_is_free(*pose) else None
 
 
 def heatmap_path(folder: str, task: BenchmarkTask) -> Path:

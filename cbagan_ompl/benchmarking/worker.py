@@ -10,7 +10,14 @@ from zlib import crc32
 from ..common.files import write_atomically
 from ..common.text import one_line
 from ..errors import ConfigError, show
-from ..planning.heatmap_sources import LEARNED, SAMPLERS, HeatmapSource, heatmap_source
+from ..planning.heatmap_sources import (
+    LEARNED,
+    SAMPLERS,
+    HeatmapSource,
+    heatmap_source,
+    is_auto,
+    resolve_auto,
+)
 from ..planning.ompl_benchmark import PlannerVariant, RunOptions, check_variants, run_benchmark
 from ..sampling.heatmap import Heatmap
 from .logs import GEOMETRIC, ExperimentLog, concatenate_logs, format_log, parse_log
@@ -43,9 +50,9 @@ def check_job(job: Job) -> None:
         ModelError: an unusable model file.
         HeatmapError: no heat map of the task where there should be one.
     """
-    grid, task = job.task.grid, job.task.task
-    endpoints = grid.check_task(task.start, task.goal)
-    check_variants(grid, endpoints, _variants(job), _options(job))
+    workspace, task = job.task.workspace, job.task.task
+    endpoints = workspace.check_task(task.start, task.goal)
+    check_variants(workspace, endpoints, _variants(job), _options(job))
 
 
 def check_heatmaps(job: Job) -> None:
@@ -73,10 +80,10 @@ def run_job(job: Job, after_round: Callable[[], None]) -> None:
         UnwritableLogError: the log cannot be written.
         CbaganOmplError: as for :func:`check_job`.
     """
-    grid, task = job.task.grid, job.task.task
-    endpoints = grid.check_task(task.start, task.goal)
+    workspace, task = job.task.workspace, job.task.task
+    endpoints = workspace.check_task(task.start, task.goal)
     recording = run_benchmark(
-        job.task.name, grid, endpoints, _variants(job), _options(job), after_round
+        job.task.name, workspace, endpoints, _variants(job), _options(job), after_round
     )
     log = concatenate_logs([parse_log(text) for text in recording.logs])
     log = add_measures(
@@ -163,6 +170,9 @@ def _source(job: Job, sampler: str) -> HeatmapSource | None:
     model = job.settings.models.get(sampler)
     if model is not None and sampler in set(SAMPLERS) - {LEARNED}:
         raise ConfigError(f"a model cannot be called {sampler}, this is another sampler's name")
+    if is_auto(sampler):
+        sampler = resolve_auto(job.task.grid)
+        model = job.settings.models.get(sampler)
     return heatmap_source(sampler if model is None else LEARNED, model)[1]
 
 
@@ -171,15 +181,17 @@ def _add_task(log: ExperimentLog, job: Job) -> ExperimentLog:
 
 
 def _task_parameters(job: Job) -> dict[str, str]:
-    (start_x, start_y), (goal_x, goal_y) = job.task.task.start, job.task.task.goal
+    ends = {"start": job.task.task.start, "goal": job.task.task.goal}
+    coordinates = {
+        f"{role}_{axis} REAL": f"{value:.9g}"
+        for role, values in ends.items()
+        for axis, value in zip(("x", "y", "yaw"), values, strict=False)
+    }
     return {
         MAP: one_line(job.task.grid.name),
         # A map without a kind forms a group by itself.
         FAMILY: one_line(job.task.task.family or job.task.grid.name),
         "task INTEGER": str(job.task.number),
-        "start_x REAL": f"{start_x:.9g}",
-        "start_y REAL": f"{start_y:.9g}",
-        "goal_x REAL": f"{goal_x:.9g}",
-        "goal_y REAL": f"{goal_y:.9g}",
+        **coordinates,
         "goal_tolerance REAL": f"{job.task.grid.resolution:.9g}",
     }

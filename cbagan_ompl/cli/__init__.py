@@ -7,13 +7,18 @@ import errno
 import os
 import sys
 import traceback
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
 
 from .. import __version__
 from ..common.files import reason
+from ..common.memory import is_out_of_memory
 from ..common.outputs import check_output
 from ..common.signals import Terminated
-from ..errors import CbaganOmplError
+from ..errors import CbaganOmplError, CbaganOmplWarning
+from .inputs import input_files
 from .parser import Parser
 
 #: Exit statuses beside 0 and 1: bad input, and what is our own fault (EX_SOFTWARE of sysexits.h).
@@ -57,16 +62,18 @@ def execute(args: argparse.Namespace) -> int:
     # Figures are files: whatever backend a notebook or a screen asks for may not be there.
     os.environ["MPLBACKEND"] = "agg"
     try:
-        check_output(getattr(args, "json", None), _inputs(args), force=_forces(args))
-        return int(args.run(args))
+        check_output(getattr(args, "json", None), input_files(args), force=_forces(args))
+        with _printed_warnings(args.command):
+            return int(args.run(args))
     except BrokenPipeError:
         # The reader of our output has gone, as in "| head -1": files are written by then.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return NO_READER
     except KeyboardInterrupt as error:
         is_terminated = isinstance(error, Terminated)
-        hint = "; go on with the same command and --resume" if hasattr(args, "resume") else ""
-        print(("terminated" if is_terminated else "interrupted") + hint, file=sys.stderr)
+        print(
+            ("terminated" if is_terminated else "interrupted") + _resume_hint(args), file=sys.stderr
+        )
         return TERMINATED if is_terminated else INTERRUPTED
     except Exception as error:
         if args.debug:
@@ -76,6 +83,34 @@ def execute(args: argparse.Namespace) -> int:
         return status
 
 
+def _resume_hint(args: argparse.Namespace) -> str:
+    """Return what to say of ``--resume`` after an interrupt."""
+    if not hasattr(args, "resume"):
+        return ""
+    if hasattr(args, "can_resume") and not args.can_resume(args):
+        return " before anything was kept; begin again with the same command"
+    return "; go on with the same command and --resume"
+
+
+@contextmanager
+def _printed_warnings(command: str) -> Iterator[None]:
+    """Print each warning of this package once, in one line, whatever filters Python was given."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("default", CbaganOmplWarning)
+        show_others = warnings.showwarning
+
+        def show_warning(
+            message: Warning | str, category: type[Warning], *where: Any, **more: Any
+        ) -> None:
+            if issubclass(category, CbaganOmplWarning):
+                print(f"cbagan-ompl {command}: warning: {message}", file=sys.stderr)
+            else:
+                show_others(message, category, *where, **more)
+
+        warnings.showwarning = show_warning
+        yield
+
+
 def _explain(error: Exception) -> tuple[int, str]:
     """Return the exit status of an error, and what to say of it."""
     if isinstance(error, CbaganOmplError):
@@ -83,25 +118,14 @@ def _explain(error: Exception) -> tuple[int, str]:
     if isinstance(error, OSError) and error.errno in _OF_THE_SYSTEM:
         file = f"{error.filename}: " if error.filename else ""
         return BAD_INPUT, str(CbaganOmplError(f"{file}{reason(error)}"))
+    if is_out_of_memory(error):
+        return BAD_INPUT, f"not enough memory: {CbaganOmplError(error)}"
     said = CbaganOmplError(f"{type(error).__name__}: {error}")
     return INTERNAL_ERROR, (
         f"this is an error of cbagan-ompl itself: {said}; please report it with what the same "
         "command prints with --debug"
     )
 
-
-# Names under which commands keep the files that they read.
-_INPUT_ARGUMENTS = (
-    "map",
-    "heatmap",
-    "model",
-    "checkpoint",
-    "dataset",
-    "path",
-    "config",
-    "inception",
-    "start_from",
-)
 
 # What a full or protected disk, and not a mistake of ours, is the cause of.
 _OF_THE_SYSTEM = {
@@ -141,12 +165,6 @@ def _make_parser() -> argparse.ArgumentParser:
     add_evaluate_parser(commands)
     _add_common_options(parser, default=False)
     return parser
-
-
-def _inputs(args: argparse.Namespace) -> list[str]:
-    """Return the files that a command reads."""
-    given = (getattr(args, name, None) for name in _INPUT_ARGUMENTS)
-    return [path for path in given if isinstance(path, str)]
 
 
 def _forces(args: argparse.Namespace) -> bool:

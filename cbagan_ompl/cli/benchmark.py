@@ -6,6 +6,7 @@ import argparse
 import os
 import shlex
 import sys
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +19,14 @@ from ..planning.heatmap_sources import LEARNED
 from .options import (
     add_map_options,
     add_sampler_options,
+    add_scheduler_option,
     describe_planners,
     describe_samplers,
     map_options,
+    open_executor,
     sampler_options,
 )
+from .robot_options import add_robot_options, robot_of
 
 # Tasks that run at a time, and characters that a report shows of the command.
 _MOST_JOBS, _LONGEST_COMMAND = 1024, 20_000
@@ -65,9 +69,9 @@ def add_benchmark_parser(commands: Any) -> None:
     tasks.add_argument(
         "--tasks",
         metavar="FILE",
-        help="tasks for the maps: .csv (map,start_x,start_y,goal_x,goal_y[,optimal_cost,"
-        "family], where family is the kind of map) or MovingAI .scen (default: those that come "
-        "with a map, otherwise random ones)",
+        help="tasks for the maps: .csv (map,start_x,start_y,goal_x,goal_y[,start_yaw,"
+        "goal_yaw,optimal_cost,family], where family is the kind of map) or MovingAI .scen "
+        "(default: those that come with a map, otherwise random ones)",
     )
     tasks.add_argument(
         "--tasks-per-map",
@@ -75,10 +79,8 @@ def add_benchmark_parser(commands: Any) -> None:
         metavar="N",
         help="at most N tasks of each map, spread over its list (default: all; 4 random ones)",
     )
-    tasks.add_argument(
-        "--radius", type=float, default=0.0, metavar="R", help="radius of the robot (default: 0)"
-    )
     add_map_options(tasks)
+    add_robot_options(parser.add_argument_group("robot", "what moves; a point by default"))
 
     comparison = parser.add_argument_group("comparison")
     comparison.add_argument(
@@ -110,7 +112,8 @@ def add_benchmark_parser(commands: Any) -> None:
         default=[],
         type=_model,
         metavar="[NAME=]FILE",
-        help="exported model of the learned sampler (default: the bundled one); with a name, "
+        help="exported model of the learned sampler, or the name of a bundled one such as cbagan "
+        "(default: the default model); with NAME, "
         "another sampler NAME with the heat maps of this model; may be repeated",
     )
     add_sampler_options(comparison)
@@ -158,6 +161,7 @@ def add_benchmark_parser(commands: Any) -> None:
         metavar="N",
         help="tasks that run at a time, each in a process (default: the number of cores)",
     )
+    add_scheduler_option(effort)
 
     output = parser.add_argument_group("output")
     output.add_argument("--output", required=True, metavar="DIR", help="folder of the results")
@@ -213,29 +217,34 @@ def _settings(args: argparse.Namespace) -> Settings:
         sampler_options=sampler_options(args),
         models=models,
         heatmap_dirs=folders,
-        radius=args.radius,
+        robot=robot_of(args),
         within=args.within,
     )
 
 
 def _benchmark(args: argparse.Namespace) -> int:
     from ..benchmarking.benchmark import Benchmark, write_results
+    from ..benchmarking.report import warn_of_hosts
     from ..benchmarking.tasks import select_tasks
 
     whole_number("jobs", args.jobs, 1, _MOST_JOBS)
-    if args.jobs > _cores():
+    if args.jobs > _cores() and args.scheduler is None:
         print(
             f"warning: {args.jobs} jobs share {_cores()} cores, all times will be too long",
             file=sys.stderr,
         )
     settings = _settings(args)
     tasks = select_tasks(
-        args.maps, args.tasks, args.tasks_per_map, args.radius, args.seed, map_options(args)
+        args.maps, args.tasks, args.tasks_per_map, settings.robot, args.seed, map_options(args)
     )
     benchmark = Benchmark(tasks, settings, Path(args.output), args.resume)
-    failures = benchmark.run(args.jobs)
+    with open_executor(args) as executor:
+        failures = benchmark.run(executor)
     logs = benchmark.finished_logs(failures)
     if logs:
         command = one_line(shlex.join(["cbagan-ompl", *sys.argv[1:]]), _LONGEST_COMMAND)
         print(write_results(logs, settings, failures, benchmark.folder, command))
+        said = warn_of_hosts(Counter(log.host for log in logs))
+        if said:
+            print(f"warning: {said}", file=sys.stderr)
     return 1 if failures else 0

@@ -10,10 +10,13 @@ from ..common.outputs import write_report
 from ..common.validation import whole_number
 from ..datasets.generation import LABELS, RANGE, RUNS, GenerationSettings, generate
 from ..datasets.importing import KEEP, describe, import_dataset, write_dataset
+from ..datasets.labelling import label_maps
 from ..datasets.splits import SPLITS
 from ..datasets.synthetic import HARD_DETOUR
 from ..errors import ConfigError
 from ..map_generators import MAP_GENERATORS
+from ..maps.grid_map import GridMap
+from .options import add_scheduler_option, open_executor
 
 # Processes that the pools of Python start, at most.
 _MAX_JOBS = 1024
@@ -49,6 +52,20 @@ Generate a training set: random maps, tasks on them, and labels by runs of RRT o
 The same seed gives the same files, whatever --jobs (with one version of OMPL).
 """
 
+_LABEL_HELP = """\
+Make a training set of your own maps: random tasks on them, labelled by runs of RRT or exactly.
+
+MAP is whatever `plan` takes: an image, a ROS map (.yaml), a MovingAI map (.map) or bundled:NAME. A
+map is scaled to --size on its longer side, as for a prediction, and made a square by blocked
+pixels. Then refine the bundled model on the set, with the recipe that it was trained with:
+
+  cbagan-ompl dataset label MAP... --output mine --tasks 200 --label geodesic
+  cbagan-ompl train mine --output runs/mine --preset refine --start-from cbagan-worlds
+  cbagan-ompl export runs/mine/best.pt --output mine.pt
+
+With --split map whole maps are kept for the test.
+"""
+
 _NOISE_HELP = """\
 Label the test tasks of a set several times by RRT, and compare the labels.
 
@@ -64,6 +81,7 @@ def add_dataset_parser(commands: Any) -> None:
     actions = parser.add_subparsers(required=True, metavar="ACTION")
     _add_import(actions)
     _add_generate(actions)
+    _add_label(actions)
     _add_noise(actions)
 
 
@@ -101,6 +119,7 @@ def _add_generate(actions: Any) -> None:
     _add_number(parser, "--tasks", defaults.tasks, "tasks on each map")
     size = "width and height of the maps in pixels; training takes multiples of 16"
     _add_number(parser, "--size", defaults.size, size)
+    _add_task_options(parser, defaults)
     parser.add_argument(
         "--generators",
         type=lambda text: tuple(text.split(",")),
@@ -111,6 +130,23 @@ def _add_generate(actions: Any) -> None:
     parser.add_argument(
         "--varied", action="store_true", help="scale, rotate and degrade the maps at random"
     )
+
+
+def _add_label(actions: Any) -> None:
+    # Images of the bundled model's size, on maps that it will meet again.
+    defaults = GenerationSettings(size=256, label="geodesic", split="task")
+    parser = _action(actions, "label", "make a set of your own maps", _LABEL_HELP)
+    parser.set_defaults(run=_label)
+    parser.add_argument("maps", nargs="+", metavar="MAP", help="map file")
+    parser.add_argument("--output", required=True, metavar="DIR", help="folder of the set")
+    _add_number(parser, "--tasks", defaults.tasks, "tasks on each map")
+    size = "width and height of the set's images in pixels; the bundled model's are 256"
+    _add_number(parser, "--size", defaults.size, size)
+    _add_task_options(parser, defaults)
+
+
+def _add_task_options(parser: argparse.ArgumentParser, defaults: GenerationSettings) -> None:
+    """Add what decides the tasks, their labels and the split of a new set."""
     hard = (
         f"fraction of tasks whose shortest path is at least {HARD_DETOUR} times as long as the "
         "straight line"
@@ -166,6 +202,7 @@ def _add_label_options(parser: argparse.ArgumentParser) -> None:
         help=f"longest edge of RRT in pixels (default: the size / {1 / RANGE:g})",
     )
     _add_number(parser, "--jobs", 1, "number of processes")
+    add_scheduler_option(parser)
 
 
 def _add_number(
@@ -206,13 +243,10 @@ def _import(args: argparse.Namespace) -> int:
     return 0
 
 
-def _generate(args: argparse.Namespace) -> int:
-    settings = GenerationSettings(
-        maps=args.maps,
+def _settings(args: argparse.Namespace, **of_maps: Any) -> GenerationSettings:
+    return GenerationSettings(
         tasks=args.tasks,
         size=args.size,
-        generators=args.generators,
-        varied=args.varied,
         copies=args.copies,
         label=args.label,
         hard_fraction=args.hard_fraction,
@@ -222,9 +256,30 @@ def _generate(args: argparse.Namespace) -> int:
         split=args.split,
         test_fraction=args.test_fraction,
         seed=args.seed,
+        **of_maps,
     )
+
+
+def _generate(args: argparse.Namespace) -> int:
+    settings = _settings(args, maps=args.maps, generators=args.generators, varied=args.varied)
     whole_number("jobs", args.jobs, 1, _MAX_JOBS)
-    generate(Path(args.output), settings, args.jobs, args.resume)
+    with open_executor(args) as executor:
+        generate(Path(args.output), settings, args.jobs, args.resume, executor=executor)
+    return _report_new_set(args, settings)
+
+
+def _label(args: argparse.Namespace) -> int:
+    settings = _settings(args, maps=len(args.maps))
+    whole_number("jobs", args.jobs, 1, _MAX_JOBS)
+    maps = {path: GridMap.load(path) for path in args.maps}
+    if len(maps) < len(args.maps):
+        raise ConfigError("a map is given twice; a set has each map once")
+    with open_executor(args) as executor:
+        label_maps(Path(args.output), maps, settings, args.jobs, args.resume, executor=executor)
+    return _report_new_set(args, settings)
+
+
+def _report_new_set(args: argparse.Namespace, settings: GenerationSettings) -> int:
     print(f"{settings.maps * settings.tasks} tasks written to {args.output}")
     if args.json is not None:
         write_report(args.json, describe(import_dataset(Path(args.output))))
@@ -239,7 +294,10 @@ def _noise(args: argparse.Namespace) -> int:
     if args.tasks is not None:
         tasks = choose_tasks(tasks, args.tasks, args.seed)
     longest_edge = tasks.size * RANGE if args.range is None else args.range
-    values = label_noise(tasks, args.runs, longest_edge, args.seed, args.jobs)
+    with open_executor(args) as executor:
+        values = label_noise(
+            tasks, args.runs, longest_edge, args.seed, args.jobs, executor=executor
+        )
     print(f"agreement of labels on {len(tasks)} tasks, {args.runs} runs of RRT each")
     for name, scores in values.items():
         if isinstance(scores, dict):

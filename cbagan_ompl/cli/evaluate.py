@@ -11,10 +11,11 @@ from ..common.files import make_folder, write_atomically
 from ..common.outputs import check_output, write_report
 from ..common.validation import check_at_least
 from ..errors import ConfigError, show
+from .options import add_scheduler_option, open_cluster
 
 if TYPE_CHECKING:
     from ..datasets.dataset import Tasks
-    from ..evaluation.evaluator import Evaluation
+    from ..evaluation.evaluator import BatchPredictions, Evaluation
 
 _TABLE, _RESULT = "evaluation.md", "evaluation.json"
 
@@ -52,7 +53,8 @@ def add_evaluate_parser(commands: Any) -> None:
         "--model",
         action="append",
         metavar="FILE",
-        help="exported model; may be repeated (default: the bundled one)",
+        help="exported model, or the name of a bundled one; may be repeated (default: the default "
+        "model)",
     )
     parser.add_argument(
         "--predictions",
@@ -74,6 +76,7 @@ def add_evaluate_parser(commands: Any) -> None:
     parser.add_argument(
         "--seed", type=int, default=0, metavar="N", help="seed of the intervals (default: 0)"
     )
+    add_scheduler_option(parser)
     parser.add_argument("--output", metavar="DIR", help="folder for the results and figures")
     parser.add_argument("--json", metavar="FILE", help="write the scores as JSON")
 
@@ -90,13 +93,17 @@ def _evaluate(args: argparse.Namespace) -> int:
     )
     from ..evaluation.report import markdown
     from ..evaluation.stored_predictions import load_predictions
+    from ..inference.model_files import find_model
     from ..inference.predictor import load_model
 
     check_at_least("seed", args.seed, 0)
     stored = [_parse_predictions(text) for text in args.predictions]
-    models = [load_model(path) for path in args.model or [None]]
+    files = [find_model(model) for model in args.model or [None]]
+    models = [load_model(path) for path in files]
     names = [str(model.record["name"]) for model in models] + [name for name, _ in stored]
     dataset = load_dataset(args.dataset)
+    # Before the models are evaluated, which takes a while.
+    regions = [load_predictions(path, Path(args.dataset), args.split) for _, path in stored]
     tasks = dataset.test if args.split == "test" else dataset.train
     baselines = trivial_baselines(tasks)
     _check_names([*names, *baselines])
@@ -105,15 +112,16 @@ def _evaluate(args: argparse.Namespace) -> int:
     features, frechet_name = region_features, REGION_GRID_NAME
     if args.inception is not None:
         features, frechet_name = partial(inception_features, path=args.inception), INCEPTION_NAME
+    predicted = _predict_remotely(files, tasks, args)
     evaluator = Evaluator(tasks, features, args.seed)
     evaluations = [
         *(
-            evaluator.evaluate_model(name, model)
-            for name, model in zip(names, models, strict=False)
+            evaluator.evaluate_model(name, model, regions)
+            for name, model, regions in zip(names, models, predicted, strict=False)
         ),
         *(
-            evaluator.evaluate(name, load_predictions(folder, Path(args.dataset), args.split))
-            for name, folder in stored
+            evaluator.evaluate(name, predicted)
+            for (name, _), predicted in zip(stored, regions, strict=True)
         ),
         *(evaluator.evaluate(name, regions) for name, regions in baselines.items()),
     ]
@@ -131,6 +139,18 @@ def _evaluate(args: argparse.Namespace) -> int:
     if args.output is not None:
         _save(Path(args.output), result, table, evaluations[: len(names)], tasks)
     return 0
+
+
+def _predict_remotely(
+    models: list[Path], tasks: Tasks, args: argparse.Namespace
+) -> list[BatchPredictions | None]:
+    """Return what each model predicts on the cluster; None for each where there is no cluster."""
+    from ..evaluation.remote import predict_remotely
+
+    with open_cluster(args) as cluster:
+        if cluster is None:
+            return [None] * len(models)
+        return [predict_remotely(model, tasks, cluster) for model in models]
 
 
 def _parse_predictions(text: str) -> tuple[str, Path]:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
+from ..common.parallel import Executor, LocalExecutor
 from ..planning.heatmap_sources import SAMPLERS
 from ..sampling.options import (
     ADAPTATION_RULES,
@@ -36,6 +39,45 @@ def map_options(args: argparse.Namespace) -> dict[str, Any]:
     if args.threshold is not None:
         options["threshold"] = args.threshold
     return options
+
+
+def add_scheduler_option(parser: Any) -> None:
+    """Add the option of :func:`open_cluster` to a parser or a group of one."""
+    parser.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="use the workers of a Dask cluster that you trust, and no processes of this machine: "
+        "address of its scheduler, tcp://HOST:PORT, or its --scheduler-file; needs "
+        "cbagan-ompl[cluster]",
+    )
+
+
+@contextmanager
+def open_cluster(args: argparse.Namespace) -> Iterator[Executor | None]:
+    """Yield the cluster that ``args.scheduler`` names, None without one.
+
+    Raises:
+        MissingDependencyError: Dask is wanted, and not installed.
+        ClusterError: the cluster cannot be used.
+    """
+    if args.scheduler is None:
+        yield None
+        return
+    from ..common.cluster import ClusterExecutor
+
+    with ClusterExecutor(args.scheduler) as executor:
+        yield executor
+
+
+@contextmanager
+def open_executor(args: argparse.Namespace) -> Iterator[Executor]:
+    """Yield where the work is done: a cluster, or ``args.jobs`` processes of this machine.
+
+    Raises:
+        CbaganOmplError: as for :func:`open_cluster`.
+    """
+    with open_cluster(args) as cluster:
+        yield cluster or LocalExecutor(args.jobs)
 
 
 def add_sampler_options(parser: Any) -> None:

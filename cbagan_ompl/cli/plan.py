@@ -8,9 +8,13 @@ from typing import Any
 from ..common.outputs import check_output, write_report
 from ..errors import ConfigError
 from ..maps.grid_map import GridMap
+from ..maps.grid_search import COMPILED
 from ..maps.loading import bundled_maps
 from ..maps.tasks import tasks_of
+from ..planning.heatmap_sources import CORRIDOR
+from ..robots.robot import Robot
 from ..sampling.heatmap import Heatmap
+from .inputs import input_files
 from .options import (
     add_map_options,
     add_sampler_options,
@@ -19,6 +23,7 @@ from .options import (
     map_options,
     sampler_options,
 )
+from .robot_options import add_robot_options, endpoint, robot_of
 
 _PLAN_HELP = """\
 Plan a path on a map with one of OMPL's planners.
@@ -46,23 +51,32 @@ def add_plan_parser(commands: Any) -> None:
     parser.set_defaults(run=_plan)
     parser.add_argument("map", metavar="MAP", help="map file, or bundled:NAME")
     _add_task(parser.add_argument_group("task"))
+    add_robot_options(parser.add_argument_group("robot", "what moves; a point by default"))
     _add_planner(parser.add_argument_group("planner"))
     _add_sampler(parser.add_argument_group("sampler"))
     _add_output(parser.add_argument_group("output"))
 
 
 def _add_task(task: Any) -> None:
-    task.add_argument("--start", type=_point, metavar="X,Y", help="where the path begins")
-    task.add_argument("--goal", type=_point, metavar="X,Y", help="where it ends")
+    task.add_argument(
+        "--start",
+        type=endpoint,
+        metavar="X,Y[,YAW]",
+        help="where the path begins; with a yaw, in radians, for robots with heading",
+    )
+    task.add_argument(
+        "--goal",
+        type=endpoint,
+        action="append",
+        metavar="X,Y[,YAW]",
+        help="where it ends; given several times, at whichever of them",
+    )
     task.add_argument(
         "--task",
         type=int,
         metavar="N",
         help="number of a task that comes with the map, from 0: a bundled map's, or a line of the "
         "MovingAI .scen beside it (default: 0 when no start and goal are given)",
-    )
-    task.add_argument(
-        "--radius", type=float, default=0.0, metavar="R", help="radius of the robot (default: 0)"
     )
     task.add_argument(
         "--snap",
@@ -102,7 +116,11 @@ def _add_sampler(sampler: Any) -> None:
         metavar="NAME",
         help=f"{describe_samplers()} (default: learned)",
     )
-    sampler.add_argument("--model", metavar="FILE", help="exported model (default: the bundled)")
+    sampler.add_argument(
+        "--model",
+        metavar="FILE",
+        help="exported model, or the name of a bundled one such as cbagan",
+    )
     sampler.add_argument(
         "--heatmap",
         metavar="FILE",
@@ -115,17 +133,7 @@ def _add_output(output: Any) -> None:
     output.add_argument("--output", metavar="FILE", help="figure of the plan (.png, .pdf, .svg)")
     output.add_argument("--no-tree", action="store_true", help="leave the tree out of the figure")
     output.add_argument("--json", metavar="FILE", help="result as JSON")
-    output.add_argument("--csv", metavar="FILE", help="way points as a table: x,y,index")
-
-
-def _point(text: str) -> tuple[float, float]:
-    try:
-        x, y = (float(part) for part in text.split(","))
-    except ValueError:
-        raise argparse.ArgumentTypeError(
-            f"expected two numbers as X,Y, such as 12.5,-40; got {text!r}"
-        ) from None
-    return x, y
+    output.add_argument("--csv", metavar="FILE", help="way points as a table: x,y[,yaw],index")
 
 
 def _plan(args: argparse.Namespace) -> int:
@@ -136,9 +144,10 @@ def _plan(args: argparse.Namespace) -> int:
 
         check_figure_path(args.output)
     for file in (args.output, args.csv):
-        check_output(file, [args.map, args.heatmap or ""], force=args.force)
+        check_output(file, input_files(args), force=args.force)
     grid = GridMap.load(args.map, **map_options(args))
-    start, goal = _endpoints(args, grid)
+    robot = robot_of(args)
+    start, goal = _endpoints(args, grid, robot)
     result = plan(
         grid,
         start,
@@ -148,7 +157,7 @@ def _plan(args: argparse.Namespace) -> int:
         time=args.time,
         iterations=args.iterations,
         range=args.range,
-        radius=args.radius,
+        robot=robot,
         snap=args.snap,
         model=args.model,
         heatmap=None if args.heatmap is None else Heatmap.load(args.heatmap, grid),
@@ -170,13 +179,13 @@ def _plan(args: argparse.Namespace) -> int:
 
 
 def _endpoints(
-    args: argparse.Namespace, grid: GridMap
-) -> tuple[tuple[float, float], tuple[float, float]]:
+    args: argparse.Namespace, grid: GridMap, robot: Robot
+) -> tuple[tuple[float, ...], tuple[float, ...] | list[tuple[float, ...]]]:
     if args.start is not None and args.goal is not None and args.task is None:
         return args.start, args.goal
     if args.start is not None or args.goal is not None:
         raise ConfigError("give both --start and --goal, or --task alone")
-    tasks = tasks_of(args.map, grid)
+    tasks = tasks_of(args.map, grid, with_yaw=robot.has_heading)
     number = args.task or 0
     if not 0 <= number < len(tasks):
         have = f"tasks 0 to {len(tasks) - 1}" if tasks else "no tasks of its own"
@@ -196,6 +205,7 @@ def _print_summary(values: dict[str, Any], figure: str | None) -> None:
         **{f"{role} moved": _describe_move(values, role) for role in values["snapped"]},
         "planner": f"{values['planner']}, OMPL {values['ompl_version']}",
         "sampler": f"{values['sampler']}, hook {values['hook'] or 'none'}",
+        **({"grid search": _describe_search(values)} if values["sampler"] == CORRIDOR else {}),
         "samples": _describe_samples(values),
         "nodes": values["nodes"],
         "inference": f"{values['inference_s']:.4f} s",
@@ -214,6 +224,12 @@ _SAMPLES = {
     "corridor": "from the corridor",
     "straight-line": "from the straight line",
 }
+
+
+def _describe_search(values: dict[str, Any]) -> str:
+    if values["grid_search"] == COMPILED:
+        return COMPILED
+    return f"{values['grid_search']}; a compiled one: pip install 'cbagan-ompl[search]'"
 
 
 def _describe_samples(values: dict[str, Any]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
 from typing import Any
 
 from ..common.outputs import write_report
@@ -12,7 +13,8 @@ from ..datasets.dataset import load_dataset
 from ..datasets.synthetic import HARD_DETOUR, TASKS_PER_MAP, SyntheticSettings
 from ..errors import ConfigError
 from ..networks.config import NETWORKS
-from ..training.config import PRESETS, TrainingConfig
+from ..training.checkpoint_files import read_checkpoint
+from ..training.config import LAST, PRESETS, TrainingConfig
 from ..training.task_sources import DatasetSource, SyntheticSchedule, TaskSource, synthetic_source
 
 _MAX_THREADS = 4096
@@ -52,7 +54,7 @@ def add_train_parser(subparsers: Any) -> None:
         description=_TRAIN_HELP,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.set_defaults(run=_train)
+    parser.set_defaults(run=_train, can_resume=_can_resume)
     tasks = parser.add_argument_group("tasks, one of both")
     tasks.add_argument("dataset", metavar="DATASET", nargs="?", help="folder that holds train.csv")
     tasks.add_argument(
@@ -63,19 +65,30 @@ def add_train_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--resume",
         action="store_true",
-        help="go on from last.pt in the output folder, or begin if it is not there yet",
+        help="go on from last.pt in the output folder, or begin if it is not there yet; --epochs "
+        "may be larger than before",
     )
     parser.add_argument(
         "--start-from",
         metavar="FILE",
-        help="begin with the weights of another run's checkpoint, which this one refines",
+        help="begin with the weights of another run's checkpoint, or of an exported model: a file, "
+        "or the name of a bundled one such as cbagan-worlds",
     )
-    recipe = parser.add_argument_group("recipe, the later overrides the earlier")
+    _add_recipe_options(parser.add_argument_group("recipe, the later overrides the earlier"))
+    _add_machine_options(parser.add_argument_group("machine"))
+    parser.add_argument(
+        "--tensorboard", action="store_true", help="write logs for TensorBoard into the folder"
+    )
+    parser.add_argument("--json", metavar="FILE", help="write the scores as JSON")
+
+
+def _add_recipe_options(recipe: Any) -> None:
     recipe.add_argument(
         "--preset",
         choices=sorted(PRESETS),
         default="best",
-        help="synthetic: what the bundled model was trained with, for images of 256 pixels; best: "
+        help="synthetic: what the bundled model was trained with, for images of 256 pixels; "
+        "refine: what --start-from cbagan-worlds goes on with; best: "
         "the best one for the paper's data; paper: the values of the paper (default: best)",
     )
     recipe.add_argument(
@@ -98,11 +111,12 @@ def add_train_parser(subparsers: Any) -> None:
         f"{', '.join(TrainingConfig().to_dict())}",
     )
     recipe.add_argument("--epochs", type=int, metavar="N", help="the same as --set epochs=N")
-    _add_machine_options(parser.add_argument_group("machine"))
-    parser.add_argument(
-        "--tensorboard", action="store_true", help="write logs for TensorBoard into the folder"
+    recipe.add_argument(
+        "--segmentation-only",
+        action="store_true",
+        help="train the generator alone, without discriminators; the same as --set "
+        "adversarial_weight=0",
     )
-    parser.add_argument("--json", metavar="FILE", help="write the scores as JSON")
 
 
 def _add_machine_options(group: Any) -> None:
@@ -164,6 +178,8 @@ def _recipe(args: argparse.Namespace) -> TrainingConfig:
     if args.config is not None:
         config = TrainingConfig.from_file(args.config, config)
     config = config.with_assignments(args.set)
+    if args.segmentation_only:
+        config = config.updated({"adversarial_weight": 0})
     return config if args.epochs is None else config.updated({"epochs": args.epochs})
 
 
@@ -173,6 +189,8 @@ def _train(args: argparse.Namespace) -> int:
         whole_number("--threads", args.threads, 1, _MAX_THREADS)
     if args.synthetic == (args.dataset is not None):
         raise ConfigError("tasks come from a DATASET or from --synthetic: give one of both")
+    if args.start_from is not None:
+        read_checkpoint(Path(args.start_from))
     require_torch()
     import torch
 
@@ -205,6 +223,11 @@ def _train(args: argparse.Namespace) -> int:
     return 0
 
 
+def _can_resume(args: argparse.Namespace) -> bool:
+    """Return whether the first epoch of a run of ``train`` is done."""
+    return (Path(args.output) / LAST).exists()
+
+
 def _source(args: argparse.Namespace, config: TrainingConfig) -> AbstractContextManager[TaskSource]:
     """Return the source of the tasks that the arguments of ``train`` ask for."""
     if args.synthetic:
@@ -232,6 +255,7 @@ def _print_scores(result: dict[str, Any]) -> None:
 
 
 def _export(args: argparse.Namespace) -> int:
+    read_checkpoint(Path(args.checkpoint))
     require_torch()
     from ..training.export import export
 

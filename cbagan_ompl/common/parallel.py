@@ -1,18 +1,32 @@
-"""Work in several processes, which an interrupt neither hits nor leaves behind."""
+"""Work in several processes, which an interrupt neither hits nor leaves behind.
+
+An :class:`Executor` says where calls run: in processes of this machine (:class:`LocalExecutor`), or
+on the workers of a cluster (:class:`.cluster.ClusterExecutor`).
+"""
 
 from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Callable, Sequence
+import sys
+from collections.abc import Callable, Generator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import active_children, forkserver, get_context, resource_tracker
+from contextlib import closing
+from dataclasses import dataclass
+from multiprocessing import (
+    active_children,
+    current_process,
+    forkserver,
+    get_context,
+    resource_tracker,
+)
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerContext
 from multiprocessing.process import BaseProcess
+from pathlib import Path
 from threading import Thread
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from tqdm import tqdm
 
@@ -36,6 +50,10 @@ def fork_server(preload: Sequence[str] = ()) -> ForkServerContext:
     Args:
         preload: modules that the server imports, where it is not there yet.
     """
+    if getattr(current_process(), "_inheriting", False):
+        # A new process imports the script that started it, which must not start processes then.
+        # It dies without a traceback; why_died tells the process that waits for it.
+        os._exit(1)
     context = get_context("forkserver")
     context.set_forkserver_preload(list(preload))
     resource_tracker.ensure_running()  # lets interrupts in again, so it must be there before
@@ -45,6 +63,20 @@ def fork_server(preload: Sequence[str] = ()) -> ForkServerContext:
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
     return context
+
+
+def why_died() -> str:
+    """Return why a process has probably died before its work was done."""
+    try:
+        script = Path(str(sys.modules["__main__"].__file__)).read_text("utf-8", "replace")
+    except (OSError, AttributeError, ValueError):  # an interactive session
+        script = "__name__"
+    if "__name__" in script:
+        return "perhaps for lack of memory"
+    return (
+        f"since {sys.argv[0]} starts it, and each process imports that script again: put what it "
+        'does into a function, and call that under `if __name__ == "__main__":`'
+    )
 
 
 def prepare_worker() -> None:
@@ -116,47 +148,157 @@ def start_first(process: BaseProcess, interrupted: Connection) -> None:
         raise errors[0]
 
 
-def run_all(
+class ProcessDied(Exception):  # noqa: N818 - it is no error of the call's own
+    """The process of a call has died; a call may raise it for a process that it started.
+
+    Args:
+        reason: how it ended.
+    """
+
+
+@dataclass(frozen=True)
+class ProcessDeath:
+    """What comes in place of a result where the process of a call has died.
+
+    Attributes:
+        reason: how it ended.
+    """
+
+    reason: str
+
+
+class Executor(Protocol):
+    """Where calls run: in processes of this machine, or on the workers of a cluster."""
+
+    def completed(
+        self,
+        work: Callable[..., T],
+        calls: Mapping[str, tuple[Any, ...]],
+        shared: tuple[Any, ...] = (),
+    ) -> Generator[tuple[str, T | ProcessDeath], None, None]:
+        """Yield the results of ``work(*shared, *args)``, in the order in which they are done.
+
+        What a call returns must not depend on where it runs: it gets its seed, and no path of a
+        file that only one machine has. Closing the generator gives up the calls that have begun.
+
+        Args:
+            work: a function of a module.
+            calls: the arguments of each call, by its name.
+            shared: first arguments of all calls, sent to each machine once.
+
+        Yields:
+            The name of a call, and what it returned.
+
+        Raises:
+            BrokenProcessPool: a process has died, and nobody can tell which call it had.
+            ClusterError: the cluster cannot do the work.
+            Exception: what a call raised.
+        """
+
+
+@dataclass(frozen=True)
+class LocalExecutor:
+    """Processes of this machine.
+
+    Attributes:
+        processes: at a time.
+
+    Example:
+        >>> executor = LocalExecutor(processes=2)
+        >>> run_all(pow, {"square": (3, 2), "cube": (3, 3)}, executor, "powers", progress=False)
+        [9, 27]
+    """
+
+    processes: int
+
+    def completed(
+        self,
+        work: Callable[..., T],
+        calls: Mapping[str, tuple[Any, ...]],
+        shared: tuple[Any, ...] = (),
+    ) -> Generator[tuple[str, T | ProcessDeath], None, None]:
+        """Yield the results of calls, see :meth:`Executor.completed`."""
+        others = set(active_children())
+        with interrupts_held():
+            context = fork_server()
+        with ProcessPoolExecutor(self.processes, context, prepare_worker) as pool:
+            try:
+                with interrupts_held():  # submitting starts the processes
+                    names = {
+                        pool.submit(run_call, work, *shared, *arguments): name
+                        for name, arguments in calls.items()
+                    }
+                for future in as_completed(names):
+                    name = names.pop(future)  # a result that has been used is not kept
+                    try:
+                        result: T | ProcessDeath = future.result()
+                    except ProcessDied as death:
+                        result = ProcessDeath(str(death))
+                    del future
+                    yield name, result
+            except BrokenProcessPool:
+                raise
+            except BaseException:
+                for child in set(active_children()) - others:
+                    child.terminate()
+                pool.shutdown(cancel_futures=True)
+                raise
+
+
+def run_each(
     work: Callable[..., T],
-    arguments: Sequence[tuple[Any, ...]],
-    processes: int,
+    calls: Mapping[str, tuple[Any, ...]],
+    executor: Executor,
+    finished: Callable[[str, T], object],
     unit: str,
     progress: bool = True,
-) -> list[T]:
-    """Return the results of ``work(*args)`` for each of the arguments, in their order.
+    shared: tuple[Any, ...] = (),
+) -> None:
+    """Run calls, and hand over each result as soon as it is there.
 
     Args:
         work: a function of a module.
-        arguments: of each call.
-        processes: at a time.
+        calls: the arguments of each call, by its name.
+        executor: where they run.
+        finished: gets the name of a call and its result, in this process.
         unit: what the progress bar counts.
         progress: show the progress bar.
+        shared: first arguments of all calls, sent to each machine once.
 
     Raises:
         KeyboardInterrupt: after an interrupt; calls that have begun are given up.
-        DatasetError: a process has died.
+        DatasetError: the processes of some calls have died; the others are done, if the executor
+            can tell them apart.
+        ClusterError: the cluster cannot do the work.
         Exception: what a call raised.
     """
-    results: dict[int, T] = {}
-    others = set(active_children())
-    with interrupts_held():
-        context = fork_server()
-    with ProcessPoolExecutor(processes, context, prepare_worker) as pool:
-        try:
-            with interrupts_held():  # submitting starts the processes
-                positions = {
-                    pool.submit(run_call, work, *args): i for i, args in enumerate(arguments)
-                }
-            done = as_completed(positions)
-            for future in tqdm(done, total=len(positions), unit=f" {unit}", disable=not progress):
-                results[positions[future]] = future.result()
-        except BrokenProcessPool as error:
-            raise DatasetError(
-                f"a process that worked on the {unit} has died, perhaps for lack of memory"
-            ) from error
-        except BaseException:
-            for child in set(active_children()) - others:
-                child.terminate()
-            pool.shutdown(cancel_futures=True)
-            raise
-    return [results[i] for i in range(len(arguments))]
+    deaths = {}
+    try:
+        with closing(executor.completed(work, calls, shared)) as done:
+            for name, result in tqdm(done, total=len(calls), unit=f" {unit}", disable=not progress):
+                if isinstance(result, ProcessDeath):
+                    deaths[name] = result.reason
+                else:
+                    finished(name, result)
+    except BrokenProcessPool as error:
+        raise DatasetError(f"a process that worked on the {unit} has died, {why_died()}") from error
+    if deaths:
+        said = "; ".join(f"{name}: {reason}" for name, reason in sorted(deaths.items()))
+        raise DatasetError(
+            f"{len(deaths)} of {len(calls)} {unit} are missing, since the processes that worked on "
+            f"them died ({said})"
+        )
+
+
+def run_all(
+    work: Callable[..., T],
+    calls: Mapping[str, tuple[Any, ...]],
+    executor: Executor,
+    unit: str,
+    progress: bool = True,
+    shared: tuple[Any, ...] = (),
+) -> list[T]:
+    """Return the results of calls in their order; arguments and errors as for :func:`run_each`."""
+    results: dict[str, T] = {}
+    run_each(work, calls, executor, results.__setitem__, unit, progress, shared)
+    return [results[name] for name in calls]

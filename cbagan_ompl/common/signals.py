@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
@@ -69,7 +69,17 @@ def interrupts_held() -> Iterator[Connection]:
         try:
             yield came
         finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
+            try:
+                _restore(before, hold)
+            except BaseException:  # of a handler that is back, for a signal that has just come
+                _restore(before, hold)
+                raise
             if caught:
                 signal.raise_signal(caught[0])
+
+
+def _restore(handlers: Mapping[signal.Signals, Any], holder: Callable[..., None]) -> None:
+    """Set the handlers of signals that another function holds back."""
+    for number, handler in handlers.items():
+        if signal.getsignal(number) is holder:
+            signal.signal(number, handler)

@@ -30,7 +30,7 @@ def finite_number(name: str, value: float, least: float) -> float:
         >>> finite_number("radius", 2, 0.0)
         2.0
     """
-    number = _to_float(value)
+    number = to_float(value)
     if not (isfinite(number) and number >= least):
         raise ConfigError(f"{name} is a finite number of at least {least:g}, got {show(value)}")
     return number
@@ -38,7 +38,7 @@ def finite_number(name: str, value: float, least: float) -> float:
 
 def positive_number(name: str, value: float) -> float:
     """Return a number above 0 as a float; arguments and errors as for :func:`finite_number`."""
-    number = _to_float(value)
+    number = to_float(value)
     if not (isfinite(number) and number > 0):
         raise ConfigError(f"{name} must be above 0, got {show(value)}")
     return number
@@ -107,13 +107,36 @@ def check_fraction(name: str, value: float) -> None:
         ConfigError: it is no number, below 0, above 1 or NaN; the message has the name of the
             option.
     """
-    if not 0 <= _to_float(value) <= 1:
+    if not 0 <= to_float(value) <= 1:
         raise ConfigError(f"{name} is a fraction from 0 to 1, got {show(value)}")
 
 
 def is_finite_number(value: object) -> bool:
     """Return whether a value is a finite real number: no text, no truth value, no array."""
-    return isfinite(_to_float(value))
+    return isfinite(to_float(value))
+
+
+def to_float(value: object) -> float:
+    """Return a number as a float; NaN where it is none, infinity where it is too large for one.
+
+    Texts, truth values and arrays are no numbers. Nothing is raised, whatever the value is.
+
+    Example:
+        >>> to_float(2), to_float("2")
+        (2.0, nan)
+    """
+    if isinstance(value, str | bytes | bytearray | memoryview | bool):
+        return nan
+    if isinstance(value, np.ndarray | np.generic) and (
+        value.ndim > 0 or value.dtype.kind not in "iuf"
+    ):
+        return nan
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except OverflowError:
+        return inf
+    except Exception:  # whatever the class of the value raises
+        return nan
 
 
 def random_generator(seed: SupportsIndex | np.random.Generator | None) -> np.random.Generator:
@@ -156,7 +179,7 @@ def require(package: str, extra: str) -> None:
     except (ImportError, OSError) as error:  # OSError for a library that is not there
         raise MissingDependencyError(
             f"this needs {package}, which cannot be imported ({error}); "
-            f"install it with: pip install 'cbagan-ompl[{extra}]'"
+            f"install it in the clone of cbagan-ompl with: pip install -e '.[{extra}]'"
         ) from error
 
 
@@ -167,19 +190,3 @@ def require_torch() -> None:
         MissingDependencyError: it is not; the message says how to install it.
     """
     require("torch", "torch")
-
-
-def _to_float(value: object) -> float:
-    """Return a number as a float; NaN where it is none, infinity where it is too large for one."""
-    if isinstance(value, str | bytes | bytearray | memoryview | bool):
-        return nan
-    if isinstance(value, np.ndarray | np.generic) and (
-        value.ndim > 0 or value.dtype.kind not in "iuf"
-    ):
-        return nan
-    try:
-        return float(value)  # type: ignore[arg-type]
-    except OverflowError:
-        return inf
-    except Exception:  # whatever the class of the value raises
-        return nan

@@ -48,11 +48,34 @@ def parse_yaml(
 
 
 class _Loader(yaml.SafeLoader):
-    """PyYAML's safe loader without aliases, with a limit on the depth."""
+    """PyYAML's safe loader without aliases, with a limit on the depth, and with tabs.
+
+    YAML lets blanks and tabs separate what stands on a line, and blanks alone indent it
+    (https://yaml.org/spec/1.2.2/#62-separation-spaces). PyYAML takes no tabs at all.
+    """
 
     def __init__(self, stream: bytes | str) -> None:
         super().__init__(stream)
         self._depth = 0
+
+    def scan_to_next_token(self) -> None:
+        """Skip blanks, comments and line breaks, and tabs where they do not indent a block."""
+        while True:
+            super().scan_to_next_token()
+            if self.peek() != "\t" or self._indents():
+                return
+            if not self.flow_level:
+                self.allow_simple_key = False  # "-<tab>key: value" would be a block
+            self.forward()
+
+    def _indents(self) -> bool:
+        """Return whether what is at the place of a tab indents a line of a block."""
+        if self.flow_level or self.buffer[self.pointer - self.column : self.pointer].strip():
+            return False
+        length = 0
+        while self.peek(length) in " \t":
+            length += 1
+        return self.peek(length) not in "#\0\r\n"
 
     def compose_node(self, parent: Any, index: Any) -> Any:
         if self.check_event(yaml.AliasEvent):
@@ -74,5 +97,5 @@ class _Loader(yaml.SafeLoader):
 def _describe(error: Exception) -> str:
     text = " ".join(str(error).split()) or type(error).__name__
     if "'\\t'" in text:
-        text += "; indent and separate with blanks, this reader takes no tabs"
+        text += "; tabs may separate words, but not indent lines: use blanks for that"
     return text if len(text) <= _LONGEST_REASON else show(text)

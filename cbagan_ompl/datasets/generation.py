@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.files import make_folder, read_text, write_json
-from ..common.parallel import run_all
+from ..common.parallel import Executor, LocalExecutor, run_each
 from ..common.validation import (
     check_fraction,
     finite_number,
@@ -146,7 +147,12 @@ class GenerationSettings:
 
 
 def generate(
-    folder: Path, settings: GenerationSettings, jobs: int, resume: bool, progress: bool = True
+    folder: Path,
+    settings: GenerationSettings,
+    jobs: int,
+    resume: bool,
+    progress: bool = True,
+    executor: Executor | None = None,
 ) -> None:
     """Generate a training set.
 
@@ -156,31 +162,78 @@ def generate(
         jobs: number of processes.
         resume: continue in a folder where a run was interrupted: only missing maps are made.
         progress: show a progress bar.
+        executor: where maps are made; by default ``jobs`` processes of this machine. The files are
+            the same, and this process writes them.
 
     Raises:
         ConfigError: ``resume`` with other settings, or without it although the folder holds a
             set; or files that are no part of such a set are in its place.
         MissingDependencyError: geodesic distances are needed, and numba is not installed.
-        DatasetError: a file cannot be written, or a map has no task of the wanted distance.
+        DatasetError: a file cannot be written, a map has no task of the wanted distance, or a
+            process has died.
+        ClusterError: the cluster cannot do the work.
     """
     if settings.needs_distances:
         require("numba", "train")
-    _prepare_folder(folder, settings, resume)
+    prepare_folder(folder, settings, resume, {})
+    executor = executor or LocalExecutor(jobs)
+    write_missing(folder, settings, executor, progress, [None] * settings.maps)
+
+
+def write_missing(
+    folder: Path,
+    settings: GenerationSettings,
+    executor: Executor,
+    progress: bool,
+    maps: Sequence[NDArray[np.bool_] | None],
+) -> None:
+    """Write the maps of a set that are not there yet, their tasks, and the lists.
+
+    Args:
+        folder: of the set.
+        settings: of the set.
+        executor: where maps are labelled; this process writes the files.
+        progress: show a progress bar.
+        maps: (S, S) each, true where free; None for a map that is generated.
+
+    Raises:
+        DatasetError: a file cannot be written, or a map has no task of the wanted distance.
+    """
     missing = [k for k in range(settings.maps) if not _task_list(folder, k).is_file()]
-    run_all(_write_map_and_tasks, [(folder, settings, k) for k in missing], jobs, "maps", progress)
+    calls = {f"map_{k}": (settings, k, maps[k]) for k in missing}
+
+    def write(_: str, made: tuple[int, Tasks]) -> None:
+        number, tasks = made
+        write_map(folder, number, tasks.maps[0] > 0)
+        write_tasks(folder, number, tasks)
+
+    run_each(_make_map_and_tasks, calls, executor, write, "maps", progress)
     rows = [task_row(k, n) for k in range(settings.maps) for n in range(settings.tasks)]
     write_lists(folder, rows, settings.select_test_tasks())
 
 
-def _prepare_folder(folder: Path, settings: GenerationSettings, resume: bool) -> None:
-    """Make the folder and its record, or check the record that is there.
+def prepare_folder(
+    folder: Path, settings: GenerationSettings, resume: bool, inputs: dict[str, Any]
+) -> None:
+    """Make the folder of a set and its record, or check the record that is there.
 
     The record also names the version of OMPL: RRT's labels differ between versions.
+
+    Args:
+        folder: of the set.
+        settings: of the set.
+        resume: a set may be there.
+        inputs: what else decides the set, for the record.
+
+    Raises:
+        ConfigError: see :func:`generate`.
+        DatasetError: the record cannot be read or written.
     """
     from ..planning.compat import ompl_version
 
     record = folder / RECORD
-    made_by = json.loads(json.dumps({"settings": asdict(settings), "ompl": ompl_version()}))
+    described = {"settings": asdict(settings), "ompl": ompl_version(), **inputs}
+    made_by = json.loads(json.dumps(described))
     if os.path.lexists(record):
         if not resume:
             raise ConfigError(
@@ -188,7 +241,8 @@ def _prepare_folder(folder: Path, settings: GenerationSettings, resume: bool) ->
             )
         if _read_record(record) != made_by:
             raise ConfigError(
-                f"{record} was written with other options or another OMPL; go on with the same"
+                f"{record} was written with other options or maps, or another OMPL; go on with the "
+                "same"
             )
         return
     check_new_folder(folder)
@@ -208,21 +262,21 @@ def _task_list(folder: Path, number: int) -> Path:
     return folder / "tasks" / f"map_{number}.csv"
 
 
-def _write_map_and_tasks(folder: Path, settings: GenerationSettings, number: int) -> None:
-    """Generate a map, its tasks and their labels, and write them."""
-    free = generate_map(settings, number)
+def _make_map_and_tasks(
+    settings: GenerationSettings, number: int, free: NDArray[np.bool_] | None
+) -> tuple[int, Tasks]:
+    """Return the number of a map, and the map, made unless it is given, with its labelled tasks."""
+    free = generate_map(settings, number) if free is None else free
     grid = GridMap(free)
     rng = np.random.default_rng((settings.seed, number, 1))
     labelled = [_generate_task(grid, settings, rng) for _ in range(settings.tasks)]
-    write_map(folder, number, free)
-    tasks = Tasks(
+    return number, Tasks(
         free[None].astype(np.uint8),
         np.zeros(settings.tasks, dtype=np.int64),
         np.array([endpoints[0] for endpoints, _ in labelled], dtype=np.float32),
         np.array([endpoints[1] for endpoints, _ in labelled], dtype=np.float32),
         np.array([region for _, region in labelled], dtype=np.uint8),
     )
-    write_tasks(folder, number, tasks)
 
 
 def generate_map(settings: GenerationSettings, number: int) -> NDArray[np.bool_]:

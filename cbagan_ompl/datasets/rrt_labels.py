@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from ..maps.grid_map import GridMap
 from ..planning import compat
 from ..planning.compat import og, ou
-from ..planning.problem import Endpoints, checked_path, make_setup
+from ..planning.paths import checked_path
+from ..planning.problem import make_setup
+from ..planning.workspace import Endpoints, Workspace
 
 # A path passes a pixel when one of its points that lie this far apart does, in pixels.
 _SPACING = 0.25
@@ -39,18 +41,18 @@ def rrt_region(
     Returns:
         (H, W), true where a path passes; false everywhere when no run found one.
     """
-    tolerance = grid.resolution
+    workspace, tolerance = Workspace(grid), grid.resolution
     region = np.zeros(grid.shape, dtype=np.bool_)
     with compat.log_level(ou.LOG_ERROR):
         compat.seed_ompl(seed)
-        setup = make_setup(grid, task, tolerance)
+        setup = make_setup(workspace, task, tolerance)
         for _ in repeat(None, runs):
             planner = og.RRT(setup.getSpaceInformation())
             planner.setRange(float(range))
             setup.setPlanner(planner)
             setup.clear()
             if compat.is_exact(setup.solve(_stop_after(iterations))):
-                path = checked_path(setup, grid, task, tolerance)
+                path = checked_path(setup, workspace, task, tolerance)
                 if path is not None:
                     columns, rows = _path_pixels(grid.to_pixel(path)).T
                     region[rows, columns] = True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from statistics import median
@@ -21,7 +22,8 @@ from .metrics import TaskScores, task_scores
 if TYPE_CHECKING:
     from ..inference.predictor import Predictor
 
-_BATCH = 32
+#: Tasks that a network predicts at once.
+BATCH = 32
 _TIMED_CALLS, _WARM_UP_CALLS = 100, 10
 
 #: Features of regions, (N, H, W) -> (N, F).
@@ -40,8 +42,9 @@ class Evaluation:
         intervals: 95 % bootstrap intervals of the scores.
         frechet: Frechet distance to the true regions.
         model: for a network ``parameters``, ``inference_ms`` (milliseconds for a task on one CPU
-            thread, median) and ``batched_ms`` (milliseconds for a task in batches, mean); empty
-            for other predictions.
+            thread, median) and ``batched_ms`` (milliseconds for a task in batches, mean), with the
+            machines that they were measured on, ``inference_host`` and ``batched_hosts``; empty for
+            other predictions.
     """
 
     name: str
@@ -60,6 +63,53 @@ class Evaluation:
             "frechet": self.frechet,
             **self.model,
         }
+
+
+@dataclass(frozen=True)
+class BatchPredictions:
+    """Regions that a network predicted in batches.
+
+    Attributes:
+        regions: (N, S, S), true in the region.
+        seconds: that it took for all of them.
+        hosts: the machines that it ran on.
+    """
+
+    regions: NDArray[np.bool_]
+    seconds: float
+    hosts: tuple[str, ...]
+
+
+def predict_batches(
+    predictor: Predictor,
+    free: NDArray[np.bool_],
+    start: NDArray[np.float32],
+    goal: NDArray[np.float32],
+) -> BatchPredictions:
+    """Predict the regions of tasks, :data:`BATCH` at once, on this machine.
+
+    Args:
+        predictor: the network.
+        free: (N, S, S), true where free.
+        start: (N, 2), pixel coordinates.
+        goal: (N, 2), the same.
+    """
+    started = perf_counter()
+    regions = [
+        _predict(predictor, free[batch], start[batch], goal[batch])
+        for batch in (slice(first, first + BATCH) for first in range(0, len(free), BATCH))
+    ]
+    seconds = perf_counter() - started
+    return BatchPredictions(np.concatenate(regions), seconds, (platform.node(),))
+
+
+def _predict(
+    predictor: Predictor,
+    free: NDArray[np.bool_],
+    start: NDArray[np.float32],
+    goal: NDArray[np.float32],
+) -> NDArray[np.bool_]:
+    return np.asarray(predictor.probabilities(free, start, goal) >= REGION_THRESHOLD)
 
 
 class Evaluator:
@@ -111,24 +161,27 @@ class Evaluator:
             model or {},
         )
 
-    def evaluate_model(self, name: str, predictor: Predictor) -> Evaluation:
-        """Score a network at the size of the data set's images, and measure its run time."""
-        batches = [slice(first, first + _BATCH) for first in range(0, len(self.tasks), _BATCH)]
-        started = perf_counter()
-        predicted = np.concatenate([self._predict(predictor, batch) for batch in batches])
-        batched = (perf_counter() - started) / len(self.tasks)
+    def evaluate_model(
+        self, name: str, predictor: Predictor, predicted: BatchPredictions | None = None
+    ) -> Evaluation:
+        """Score a network at the size of the data set's images, and measure its run time.
+
+        Args:
+            name: of the predictor.
+            predictor: the network.
+            predicted: its predictions, where they have been made already.
+        """
+        tasks = self.tasks
+        if predicted is None:
+            predicted = predict_batches(predictor, self._free, tasks.start, tasks.goal)
         model = {
             "parameters": predictor.record["parameters"],
             "inference_ms": 1000 * self._time_single(predictor),
-            "batched_ms": 1000 * batched,
+            "inference_host": platform.node(),
+            "batched_ms": 1000 * predicted.seconds / len(tasks),
+            "batched_hosts": list(predicted.hosts),
         }
-        return self.evaluate(name, predicted, model)
-
-    def _predict(self, predictor: Predictor, batch: slice) -> NDArray[np.bool_]:
-        values = predictor.probabilities(
-            self._free[batch], self.tasks.start[batch], self.tasks.goal[batch]
-        )
-        return np.asarray(values >= REGION_THRESHOLD)
+        return self.evaluate(name, predicted.regions, model)
 
     def _time_single(self, predictor: Predictor) -> float:
         """Return the median time of a single task in seconds."""
@@ -136,6 +189,7 @@ class Evaluator:
         for i in range(_WARM_UP_CALLS + _TIMED_CALLS):
             task = i % len(self.tasks)
             started = perf_counter()
-            self._predict(predictor, slice(task, task + 1))
+            one = slice(task, task + 1)
+            _predict(predictor, self._free[one], self.tasks.start[one], self.tasks.goal[one])
             seconds.append(perf_counter() - started)
         return median(seconds[_WARM_UP_CALLS:])

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.parallel import run_all
+from ..common.parallel import Executor, LocalExecutor, run_all
 from ..common.validation import positive_number, whole_number
 from ..datasets.dataset import Tasks
 from ..datasets.generation import ITERATIONS
@@ -38,7 +38,13 @@ def choose_tasks(tasks: Tasks, count: int, seed: int) -> Tasks:
 
 
 def label_noise(
-    tasks: Tasks, runs: int, range: float, seed: int, jobs: int, progress: bool = True
+    tasks: Tasks,
+    runs: int,
+    range: float,
+    seed: int,
+    jobs: int,
+    progress: bool = True,
+    executor: Executor | None = None,
 ) -> dict[str, Any]:
     """Label tasks several times with different seeds, and compare the labels.
 
@@ -55,6 +61,7 @@ def label_noise(
         seed: the same seed gives the same labels.
         jobs: number of processes.
         progress: show a progress bar.
+        executor: where tasks are labelled; by default ``jobs`` processes of this machine.
 
     Returns:
         ``tasks``, ``runs``, ``range`` and ``seed``, and the IoU and Dice, pooled over all pixels
@@ -66,16 +73,19 @@ def label_noise(
     Raises:
         ConfigError: an argument out of range.
         TaskError: a task whose start or goal is blocked, or which has no path.
+        DatasetError: a process has died.
+        ClusterError: the cluster cannot do the work.
     """
     whole_number("runs", runs, 1)
     positive_number("range", range)
     whole_number("seed", seed, 0)
     free = tasks.free
-    arguments = [
-        (free[i], tasks.start[i], tasks.goal[i], runs, range, (seed, i))
+    calls = {
+        f"task {i}": (free[i], tasks.start[i], tasks.goal[i], runs, range, (seed, i))
         for i in np.arange(len(tasks)).tolist()
-    ]
-    labels = np.array(run_all(_label_task, arguments, jobs, "tasks", progress))
+    }
+    executor = executor or LocalExecutor(jobs)
+    labels = np.array(run_all(_label_task, calls, executor, "tasks", progress))
     first, second, others = labels[:, 0], labels[:, 1], labels[:, 1:]
     majority = 2 * others.sum(axis=1) > others.shape[1]
     own = tasks.region.astype(bool)

@@ -30,9 +30,14 @@ def load_predictions(folder: Path, dataset: Path, part: str) -> NDArray[np.bool_
         (N, S, S), true in the region, in the order of the tasks.
 
     Raises:
-        DatasetError: a prediction is missing, no image, no square, or of another size than the
-            others; or the list of them cannot be read.
+        DatasetError: the folder or a prediction is missing; a prediction is no image, no square,
+            or of another size than the others; or the list of them cannot be read.
     """
+    if not folder.is_dir():
+        raise DatasetError(
+            f"{folder}: no such folder of predictions; a copy that `dataset import` wrote does not "
+            "hold those of the original set, whose tasks may have other numbers"
+        )
     files = _find_images(folder)
     labels = label_files(dataset, part)
     regions: NDArray[np.bool_] | None = None

@@ -9,15 +9,17 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import os
 import re
 import warnings
 import zipfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..common.files import read_bytes, read_text
+from ..common.files import as_path, read_bytes, read_text
 from ..errors import ModelError, show
 from ..networks.config import MAX_IMAGE_SIZE, MAX_WEIGHTS
 from .archives import MAX_EXPANSION, Archive, pack
@@ -60,22 +62,56 @@ _TENSORS = ("data", "constants")
 _DAMAGED = "the file is damaged", "copy or export it again"
 
 _SHA256 = re.compile(r"[0-9a-f]{64}")
+_NAME = re.compile(r"[A-Za-z0-9_-]{1,100}")
 
 _EXPORT_HINT = "export one with: cbagan-ompl export CHECKPOINT --output MODEL.pt"
 
 
-def bundled_model() -> Path:
-    """Return the path of the default model, which comes with the package.
+def bundled_model(name: str | None = None) -> Path:
+    """Return the path of a model that comes with the package.
+
+    Args:
+        name: without ``.pt``; None for the default model.
 
     Raises:
-        ModelError: this installation has none.
+        ModelError: this installation has none of that name.
     """
     package = Path(__file__).resolve().parent.parent
     # An installed wheel has the folder inside the package, a checkout beside it.
     for folder in (package / "models", package.parent / "models"):
         if (folder / MANIFEST).is_file():
-            return folder / str(read_manifest(folder / MANIFEST)["default"])
+            manifest = read_manifest(folder / MANIFEST)
+            path = folder / (f"{name}.pt" if name else str(manifest["default"]))
+            if name and not (path.name in manifest["files"] and path.is_file()):
+                present = (folder / file for file in manifest["files"])
+                names = ", ".join(sorted(file.stem for file in present if file.is_file()))
+                raise ModelError(
+                    f"there is no bundled model {show(name)}: give one of {names}, or the path of "
+                    f"a model file (.pt); {_EXPORT_HINT}"
+                )
+            return path
     raise ModelError(f"this installation has no bundled model; {_EXPORT_HINT}, and give its path")
+
+
+def find_model(model: str | PathLike[str] | None) -> Path:
+    """Return the path of a model file.
+
+    Args:
+        model: a path; or the name of a bundled model, a text without suffix and folder where no
+            file has that name; None for the default model.
+
+    Raises:
+        ModelError: there is no bundled model of that name, or the path is none.
+
+    Example:
+        >>> find_model("cbagan").name
+        'cbagan.pt'
+    """
+    if model is None:
+        return bundled_model()
+    path = as_path(model, ModelError)
+    is_name = isinstance(model, str) and bool(_NAME.fullmatch(model))
+    return bundled_model(str(model)) if is_name and not os.path.lexists(path) else path
 
 
 def read_manifest(path: Path) -> dict[str, Any]:
@@ -154,6 +190,14 @@ def read_model(path: Path) -> ModelFile:
     record = _parse_record(path, text)
     with translate_damage(path, *_DAMAGED):
         return ModelFile(record, _checked_script(archive), is_listed)
+
+
+def is_model(path: Path) -> bool:
+    """Return whether a file is an exported model, perhaps a damaged one."""
+    try:
+        return RECORD_MEMBER in Archive(read_bytes(path, ModelError, MAX_MODEL_BYTES)).sizes
+    except Exception:  # zipfile lets many types through
+        return False
 
 
 def read_record(path: Path) -> dict[str, Any]:

@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..common.files import as_path
+from ..common.memory import is_out_of_memory, translate_lack_of_memory
 from ..common.validation import require_torch, truth_value, whole_number
-from ..errors import MapError, ModelError, TaskError, show
+from ..errors import ModelError, TaskError, show
+from ..maps.checks import check_grid
 from ..maps.grid_map import GridMap
+from ..maps.grid_search import prepare_search
 from ..networks.config import MAX_IMAGE_SIZE
 from ..sampling.heatmap import Heatmap
-from .model_files import bundled_model, load_script, read_model
+from .model_files import find_model, load_script, read_model
 from .probe import Kind, try_model
 from .scaling import enlarged_values, scaled_map, scaled_shape
 from .torch_state import own_torch_state
@@ -44,7 +46,8 @@ def load_model(path: str | PathLike[str] | None = None) -> Predictor:
     one) is tried in another process first, which takes a second, once for each content.
 
     Args:
-        path: a file that ``cbagan-ompl export`` wrote; the bundled model by default.
+        path: a file that ``cbagan-ompl export`` wrote, or the name of a model that comes with the
+            package, such as ``cbagan``, that of the paper; the default model without it.
 
     Raises:
         MissingDependencyError: torch is not installed.
@@ -53,8 +56,10 @@ def load_model(path: str | PathLike[str] | None = None) -> Predictor:
     Example:
         >>> load_model()
         Predictor('cbagan-worlds', working size 256 pixels)
+        >>> load_model("cbagan")
+        Predictor('cbagan', working size 64 pixels)
     """
-    source = bundled_model() if path is None else as_path(path, ModelError)
+    source = find_model(path)
     model = read_model(source)  # before torch is loaded, which takes seconds
     require_torch()
     if not model.is_listed:
@@ -62,9 +67,14 @@ def load_model(path: str | PathLike[str] | None = None) -> Predictor:
     try:
         predictor = Predictor(load_script(model.script), model.record)
         predictor.warm_up()
+        prepare_search(with_costs=True)  # for regions that have to be connected
     except ModelError as error:
-        raise ModelError(f"{source}: {error}; copy or export it again") from error
+        is_damaged = error.__cause__ is None or not is_out_of_memory(error.__cause__)
+        hint = "; copy or export it again" if is_damaged else ""
+        raise ModelError(f"{source}: {error}{hint}") from error
     except Exception as error:  # torch raises many types for damaged archives
+        if is_out_of_memory(error):
+            raise ModelError(f"{source}: not enough memory to load the model") from error
         raise ModelError(
             f"{source}: torch cannot load the model ({type(error).__name__}), the file is "
             "probably damaged; copy or export it again"
@@ -76,6 +86,7 @@ class Predictor:
     """An exported model, ready to predict.
 
     Attributes:
+        module: the TorchScript module.
         record: what the model file says about itself: ``working_size``, ``metrics``, ``recipe``...
         inference_threads: CPU threads for one prediction. More than one rarely helps at the
             working size, and takes ten times as long where other work has the cores.
@@ -103,7 +114,7 @@ class Predictor:
                 f"{show(record)}; load_model makes one from a file"
             )
         whole_number("working_size", record.get("working_size", 0), 1, MAX_IMAGE_SIZE)
-        self._module = module
+        self.module = module
         self.record = record
         self.inference_threads = 1
 
@@ -185,11 +196,7 @@ class Predictor:
         self, grid: GridMap, starts: list[ArrayLike], goals: list[ArrayLike], repair: bool
     ) -> list[Heatmap]:
         """Predict for tasks on one map, in one pass of the network."""
-        if not isinstance(grid, GridMap):
-            raise MapError(
-                f"predict takes a GridMap, got {show(grid)}; make one of an array, true where "
-                "free, with GridMap(array)"
-            )
+        check_grid(grid)
         repair = truth_value("repair", repair)
         tasks = [grid.check_task(*task) for task in zip(starts, goals, strict=True)]
         shape = scaled_shape(grid.shape, int(self.record["working_size"]))
@@ -214,13 +221,23 @@ class Predictor:
 
         Returns:
             (B, H, W), the probability that a pixel belongs to the region.
+
+        Raises:
+            ModelError: there is not enough memory.
         """
         import torch
 
         cells = torch.from_numpy(free.astype(np.float32))[:, None]
         endpoints = (torch.from_numpy(points.astype(np.float32)) for points in (start, goal))
-        with own_torch_state(self.inference_threads):
-            values = self._module(cells, *endpoints)
+        with (
+            translate_lack_of_memory(
+                ModelError,
+                f"to predict for cells of shape {tuple(cells.shape)}",
+                "give it fewer at a time, or take a model with a smaller working size",
+            ),
+            own_torch_state(self.inference_threads),
+        ):
+            values = self.module(cells, *endpoints)
             result: NDArray[np.float32] = values[:, 0].numpy()
         return result
 

@@ -102,7 +102,7 @@ def _find_places(grid: GridMap, role: str, point: ArrayLike, distance: float) ->
 
     A point in free space has itself alone.
     """
-    position = _check_position(grid, role, point)
+    position = check_position(grid, role, point)
     if grid.is_free(position):
         column, row = grid.to_pixel(position).astype(int).tolist()
         return {int(grid.components[row, column]): _Place(position, 0.0)}
@@ -132,7 +132,7 @@ def _find_places(grid: GridMap, role: str, point: ArrayLike, distance: float) ->
 
 
 def _check_free(grid: GridMap, role: str, point: ArrayLike) -> NDArray[np.float64]:
-    position = _check_position(grid, role, point)
+    position = check_position(grid, role, point)
     column, row = np.floor(grid.to_pixel(position)).astype(int).tolist()
     if not grid.free[row, column]:
         raise TaskError(
@@ -162,7 +162,17 @@ def check_point(role: str, point: ArrayLike) -> NDArray[np.float64]:
     return np.array([float(value) for value in values])
 
 
-def _check_position(grid: GridMap, role: str, point: ArrayLike) -> NDArray[np.float64]:
+def check_position(grid: GridMap, role: str, point: ArrayLike) -> NDArray[np.float64]:
+    """Return a position on a map as a (2,) array.
+
+    Args:
+        grid: the map.
+        role: of the position, for the message.
+        point: (x, y), world.
+
+    Raises:
+        TaskError: no point, or one outside of the map.
+    """
     position = check_point(role, point)
     column, row = np.floor(grid.to_pixel(position)).tolist()
     if not (0 <= column < grid.width and 0 <= row < grid.height):
@@ -177,12 +187,12 @@ def _check_position(grid: GridMap, role: str, point: ArrayLike) -> NDArray[np.fl
 def _describe_blocked(grid: GridMap, position: NDArray[np.float64]) -> str:
     """Return what is at a blocked position: a wall, the margin around one, or unknown space."""
     column, row = np.floor(grid.to_pixel(position)).astype(int).tolist()
-    bare = grid.bare
-    if bare is not grid and bare.free[row, column]:
-        return f"too close to an obstacle of {bare.name} for the robot's radius"
-    if bare.unknown is not None and bare.unknown[row, column]:
-        return f"in unknown space of {bare.name}"
-    return f"in an obstacle of {bare.name}"
+    name, was_free = grid.bare
+    if was_free[row, column]:
+        return f"too close to an obstacle of {name} for the robot's radius"
+    if grid.unknown is not None and grid.unknown[row, column]:
+        return f"in unknown space of {name}"
+    return f"in an obstacle of {name}"
 
 
 def _format(point: NDArray[np.float64]) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import cached_property
 from os import PathLike
 from typing import Any
-from weakref import ReferenceType, ref
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -73,8 +72,8 @@ class GridMap:
         self.origin = check_origin(origin, name)
         self.unknown = check_unknown(unknown, self.shape, name)
         check_frame(self.resolution, self.origin, self.shape, name)
-        # The map before it was inflated. Weakly, since that one keeps this one.
-        self._bare: ReferenceType[GridMap] | None = None
+        #: Name and free pixels before obstacles were inflated, for messages.
+        self.bare = name, self.free
         self._inflated: dict[float, GridMap] = {}
 
     @classmethod
@@ -175,13 +174,8 @@ class GridMap:
         return cls(raw.free, raw.resolution, raw.origin, name=raw.name, unknown=raw.unknown)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave out the other maps when the map is sent to another process, or copied."""
-        return {**self.__dict__, "_bare": None, "_inflated": {}}
-
-    @property
-    def bare(self) -> GridMap:
-        """The map before it was inflated; the map itself where it was not, or that one is gone."""
-        return (self._bare and self._bare()) or self
+        """Leave out the inflated maps when the map is sent to another process, or copied."""
+        return {**self.__dict__, "_inflated": {}}
 
     @property
     def width(self) -> int:
@@ -288,7 +282,7 @@ class GridMap:
             free = erode(self.free, radius, self.resolution, self.name)
             name = f"{self.name} (inflated by {radius:g})"
             grown = GridMap(free, self.resolution, self.origin, name=name, unknown=self.unknown)
-            grown._bare = ref(self.bare)
+            grown.bare = self.bare
             if len(self._inflated) == _KEPT_RADII:
                 del self._inflated[next(iter(self._inflated))]
             self._inflated[radius] = grown

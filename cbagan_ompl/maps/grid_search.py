@@ -1,8 +1,17 @@
-"""Shortest paths over the free pixels of a grid, for the corridor and for repairing heat maps."""
+"""Shortest paths over the free pixels of a grid, for the corridor and for repairing heat maps.
+
+They are searched by compiled functions where numba is installed (the extra ``search``), else by
+SciPy, which takes many times as long; :func:`search_kind` says which. Both find paths of the same
+cost.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import lru_cache
 from itertools import pairwise
+from types import ModuleType
+from typing import Any
 
 import cv2
 import numpy as np
@@ -20,6 +29,32 @@ _NO_PREDECESSOR = -9999
 _BAND = 3
 
 
+#: What :func:`search_kind` returns.
+COMPILED, SCIPY = "compiled", "SciPy"
+
+
+def search_kind() -> str:
+    """Return what paths are searched with here: :data:`COMPILED` or :data:`SCIPY`."""
+    return SCIPY if _load_compiled() is None else COMPILED
+
+
+def prepare_search(with_costs: bool = False) -> None:
+    """Load what paths are searched with, and compile it where that is not done yet.
+
+    That takes half a second, and once on each machine some ten seconds, which the first search
+    would take otherwise.
+
+    Args:
+        with_costs: also what searches with a cost for each pixel.
+    """
+    free = np.ones((3, 3), np.bool_)
+    path = shortest_path(free, (0, 0), (2, 2))
+    assert path is not None
+    pull_taut(free, path)
+    if with_costs:
+        shortest_path(free, (0, 0), (2, 2), np.ones((3, 3), np.float32))
+
+
 def shortest_path(
     free: NDArray[np.bool_],
     start: tuple[int, int],
@@ -31,7 +66,7 @@ def shortest_path(
 
     A diagonal step needs both pixels beside it free, so that the path is a valid motion. Large
     grids are searched around the path through a coarse grid first, so that their path may be a
-    little costlier than the cheapest.
+    little costlier than the cheapest; the compiled search without costs needs no such help.
 
     Args:
         free: shape (H, W).
@@ -46,20 +81,20 @@ def shortest_path(
         Pixels (column, row), shape (K, 2), both endpoints included; None where no path connects
         them.
     """
-    costs = np.ones(free.shape, np.float32) if cost is None else cost
-    if max(free.shape) > 2 * coarse_size:
-        band = _coarse_band(free, start, goal, costs, coarse_size)
-        path = None if band is None else _search(free & band, start, goal, costs)
+    is_large = max(free.shape) > 2 * coarse_size
+    if is_large and (cost is not None or search_kind() == SCIPY):
+        band = _coarse_band(free, start, goal, cost, coarse_size)
+        path = None if band is None else _search(free & band, start, goal, cost)
         if path is not None:
             return path
-    return _search(free, start, goal, costs)
+    return _search(free, start, goal, cost)
 
 
 def _coarse_band(
     free: NDArray[np.bool_],
     start: tuple[int, int],
     goal: tuple[int, int],
-    costs: NDArray[np.float32],
+    cost: NDArray[np.float32] | None,
     coarse_size: int,
 ) -> NDArray[np.bool_] | None:
     """Return the pixels near the cheapest path through blocks of pixels.
@@ -71,7 +106,9 @@ def _coarse_band(
     blocks = np.pad(free, padding)
     shape = blocks.shape[0] // size, size, blocks.shape[1] // size, size
     coarse = np.asarray(blocks.reshape(shape).any(axis=(1, 3)))
-    coarse_cost = np.pad(costs, padding, mode="edge").reshape(shape).mean(axis=(1, 3))
+    coarse_cost = (
+        np.pad(_as_costs(cost, free.shape), padding, mode="edge").reshape(shape).mean(axis=(1, 3))
+    )
     source, target = ((u // size, v // size) for u, v in (start, goal))
     path = _search(coarse, source, target, coarse_cost)
     if path is None:
@@ -83,7 +120,34 @@ def _coarse_band(
     return fine.astype(bool)
 
 
+@lru_cache(maxsize=1)
+def _load_compiled() -> ModuleType | None:
+    """Return the compiled searches; None where numba is missing, or cannot be used."""
+    try:
+        from . import compiled_search
+    except Exception:  # no numba, or no folder in which it may keep what it compiles
+        return None
+    return compiled_search
+
+
 def _search(
+    free: NDArray[np.bool_],
+    start: tuple[int, int],
+    goal: tuple[int, int],
+    cost: NDArray[np.float32] | None,
+) -> NDArray[np.intp] | None:
+    compiled = _load_compiled()
+    if compiled is not None:
+        path: NDArray[np.intp] | None = compiled.find_path(free, start, goal, cost)
+        return path
+    return _search_graph(free, start, goal, _as_costs(cost, free.shape))
+
+
+def _as_costs(cost: NDArray[np.float32] | None, shape: tuple[int, ...]) -> NDArray[np.float32]:
+    return np.ones(shape, np.float32) if cost is None else cost
+
+
+def _search_graph(
     free: NDArray[np.bool_],
     start: tuple[int, int],
     goal: tuple[int, int],
@@ -137,11 +201,17 @@ def pull_taut(free: NDArray[np.bool_], pixels: NDArray[np.intp]) -> NDArray[np.f
         Corner points of the shortened path at pixel centres, (u, v), shape (M, 2), M <= K.
     """
     height, width = free.shape
-    cells = free.tobytes()
+    compiled = _load_compiled()
+    is_free: Callable[..., bool]
+    cells: Any
+    if compiled is None:
+        is_free, cells = segment_is_free, free.tobytes()
+    else:
+        is_free, cells = compiled.segment_is_free_compiled, free.ravel()
     points = (pixels + 0.5).tolist()
     corners = [points[0]]
     for here, ahead in pairwise(points[1:]):
-        if not segment_is_free(cells, width, height, *corners[-1], *ahead):
+        if not is_free(cells, width, height, *corners[-1], *ahead):
             corners.append(here)
     corners.append(points[-1])
     return np.array(corners, dtype=np.float64)

@@ -7,6 +7,7 @@ has been compared with the file, and no memory is spent before the size is known
 from __future__ import annotations
 
 from typing import Any, NamedTuple
+from zlib import crc32
 
 import cv2
 import numpy as np
@@ -21,6 +22,7 @@ from .image_headers import (
     measure_bmp,
     measure_jpeg,
     measure_png,
+    padded_jpeg,
     truncated,
 )
 from .netpbm import MAGIC, decode_netpbm
@@ -35,7 +37,7 @@ MAX_IMAGE_BYTES = 3 * MAX_PIXELS + 2**16
 # Most memory that decoding may take, in bytes: three for each pixel of the largest map.
 _MAX_DECODED = 3 * MAX_PIXELS
 
-_PNG = b"\x89PNG\r\n\x1a\n"
+_PNG, _JPEG = b"\x89PNG\r\n\x1a\n", b"\xff\xd8"
 
 # Pixels that are looked up in a table at a time.
 _BLOCK = 2**20
@@ -79,10 +81,13 @@ class DecodedImage(NamedTuple):
 
 
 def decode_image(
-    data: bytes, name: str, error_class: type[CbaganOmplError] = MapError
+    data: bytes,
+    name: str,
+    error_class: type[CbaganOmplError] = MapError,
+    size: tuple[int, int] | None = None,
 ) -> DecodedImage:
     """Decode an image file to gray levels; arguments and errors as for :func:`decode_pixels`."""
-    pixels, white = decode_pixels(data, name, error_class)
+    pixels, white = decode_pixels(data, name, error_class, size)
     if pixels.ndim == 2:
         return DecodedImage(pixels, white, None)
     has_alpha = pixels.shape[2] == 4
@@ -138,7 +143,7 @@ def decode_pixels(
             raise truncated()
         if data.startswith(_PNG):
             data = essential_png(data)
-        values = _decode(data)
+        values = _decode_whole_jpeg(data) if data.startswith(_JPEG) else _decode(data)
         if values.shape[:2] != (header.height, header.width):
             raise damaged("its size is not the one that it announces")
     except BrokenImageError as error:
@@ -149,13 +154,22 @@ def decode_pixels(
 def _measure(data: bytes) -> Header:
     if data.startswith(_PNG):
         return measure_png(data)
-    if data.startswith(b"\xff\xd8"):
+    if data.startswith(_JPEG):
         return measure_jpeg(data)
     if data.startswith(b"BM"):
         return measure_bmp(data)
     raise BrokenImageError(
         "the content is no PNG, JPEG, BMP, PGM or PPM image" if data else "the file is empty"
     )
+
+
+def _decode_whole_jpeg(data: bytes) -> NDArray[np.uint8 | np.uint16]:
+    """Decode a JPEG file; raise where the data of its pixels end before its pixels do."""
+    checksum = crc32(_decode(data).data)  # of pixels that are not kept: they may be many
+    values = _decode(padded_jpeg(data))
+    if crc32(values.data) != checksum:
+        raise truncated(" or damaged, its data end before its pixels do")
+    return values
 
 
 def _decode(data: bytes) -> NDArray[np.uint8 | np.uint16]:

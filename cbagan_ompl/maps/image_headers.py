@@ -34,6 +34,8 @@ _ADAM7 = (
 _JPEG_MARKER = re.compile(rb"\xff+([^\xff\0])")
 # In the data of a scan FF 00 is a byte, and D0 to D7 are marks from which a decoder can go on.
 _JPEG_SCAN_END = re.compile(rb"\xff[^\0\xd0-\xd7\xff]")
+# Neither all ones, which fill up the last byte of a scan, nor the zeros that decoders fill in.
+_PADDING = b"\x55"
 _BASELINE, _PROGRESSIVE, _SCAN, _END = (0xC0, 0xC1), 0xC2, 0xDA, 0xD9
 
 _BMP_HEADERS = (12, 40, 52, 56, 64, 108, 124)
@@ -192,12 +194,12 @@ def measure_jpeg(data: bytes) -> Header:
     """
     frame: tuple[int, int, int, int] | None = None
     marker = scans = 0
-    for marker, segment in _jpeg_segments(data):
+    for marker, start, end in _jpeg_segments(data):
         # C0 to CF are frames, but for C4, C8 and CC, which are tables.
         if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):
             if frame is not None:
                 raise damaged("it has two frames")
-            frame = _jpeg_frame(marker, segment)
+            frame = _jpeg_frame(marker, data[start:end])
         scans += marker == _SCAN
     if frame is None:
         raise truncated()
@@ -211,8 +213,29 @@ def measure_jpeg(data: bytes) -> Header:
     return Header(width, height, width * height * components * (3 if several else 1), is_whole)
 
 
-def _jpeg_segments(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """Yield marker and segment, as far as the file reaches; the last marker is that of its end."""
+def padded_jpeg(data: bytes) -> bytes:
+    """Return a JPEG file with a byte more where the data of its pixels end.
+
+    Decoders fill in what is missing there, without an error. Where nothing is missing they skip
+    the byte, so that a file whose pixels are others with it was truncated or damaged. Only what
+    follows the last mark from which a decoder can go on is tried: more padding would make the
+    decoder complain of files that are whole.
+
+    Args:
+        data: a file that :func:`measure_jpeg` has found whole.
+    """
+    end = next(at for marker, at, _ in _jpeg_segments(data) if marker == _END)
+    mark = data.rindex(b"\xff", 0, end)
+    while data[mark - 1] == 0xFF:  # fill bytes
+        mark -= 1
+    return data[:mark] + _PADDING + data[mark:]
+
+
+def _jpeg_segments(data: bytes) -> Iterator[tuple[int, int, int]]:
+    """Yield marker, and begin and end of its segment, as far as the file reaches.
+
+    The last marker is that of the end of the image.
+    """
     at = 2
     for _ in range(_MAX_PARTS):
         found = _JPEG_MARKER.match(data, at)
@@ -220,7 +243,7 @@ def _jpeg_segments(data: bytes) -> Iterator[tuple[int, bytes]]:
             return
         at, marker = found.end(), found[1][0]
         if marker == _END:
-            yield marker, b""
+            yield marker, at, at
             return
         if marker == 0x01 or 0xD0 <= marker <= 0xD7:  # stand alone, without a length
             continue
@@ -229,7 +252,7 @@ def _jpeg_segments(data: bytes) -> Iterator[tuple[int, bytes]]:
             return
         if end < at + 2 or marker == 0xD8:
             raise damaged("its segments make no sense")
-        yield marker, data[at:end]
+        yield marker, at, end
         at = end
         if marker == _SCAN:
             following = _JPEG_SCAN_END.search(data, at)

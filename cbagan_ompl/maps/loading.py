@@ -7,6 +7,7 @@ map.
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from importlib import resources
 from pathlib import Path
@@ -14,18 +15,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..common.files import read_bytes
+from ..common.files import as_path, read_bytes
+from ..common.validation import finite_number, positive_number
 from ..errors import ConfigError, MapError, show
 from .image_files import MAX_IMAGE_BYTES, SUFFIXES, decode_image
 from .movingai import read_movingai_map
 from .raw_map import RawMap
-from .ros import read_ros_map
+from .ros import image_of_ros_map, read_ros_map
+from .svg import read_svg_map
 
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
 
 #: What a path to a map that comes with the package begins with.
 BUNDLED = "bundled:"
+
+_YAML_SUFFIXES = (".yaml", ".yml")
 
 
 @dataclass(frozen=True)
@@ -39,6 +44,8 @@ class MapOptions:
         unknown_is_free: whether pixels of unknown state are free. Unknown are the transparent
             pixels of an image (any alpha below full), and in a ROS map also those that are
             neither free nor occupied, see :mod:`cbagan_ompl.maps.ros`.
+        resolution: SVG maps only: world units per pixel.
+        margin: SVG maps only: free space around the polygons, world units.
 
     Raises:
         ConfigError: a value of the wrong type or out of range.
@@ -46,6 +53,8 @@ class MapOptions:
 
     threshold: float = 0.5
     unknown_is_free: bool = False
+    resolution: float = 0.1
+    margin: float = 0.0
 
     def __post_init__(self) -> None:
         number = isinstance(self.threshold, (int, float)) and not isinstance(self.threshold, bool)
@@ -53,6 +62,8 @@ class MapOptions:
             raise ConfigError(f"threshold must be a number from 0 to 1, got {show(self.threshold)}")
         if not isinstance(self.unknown_is_free, bool):
             raise ConfigError(f"unknown_is_free is True or False, got {show(self.unknown_is_free)}")
+        positive_number("resolution", self.resolution)
+        finite_number("margin", self.margin, 0.0)
 
 
 def read_map(path: str | os.PathLike[str], **options: Any) -> RawMap:
@@ -71,23 +82,44 @@ def read_map(path: str | os.PathLike[str], **options: Any) -> RawMap:
         if option not in known:
             raise ConfigError(f"unknown map option {show(option)}; known are {', '.join(known)}")
     settings = MapOptions(**options)
+    file = as_path(path, MapError)
     if str(path).startswith(BUNDLED):
         return _read_bundled(str(path).removeprefix(BUNDLED), settings)
 
-    file = Path(path)
     suffix = file.suffix.lower()
     if suffix in SUFFIXES:
         return _read_image_map(
             read_bytes(file, limit=MAX_IMAGE_BYTES), str(file), file.stem, settings
         )
-    if suffix in (".yaml", ".yml"):
+    if suffix in _YAML_SUFFIXES:
         return read_ros_map(file, unknown_is_free=settings.unknown_is_free)
     if suffix == ".map":
         return read_movingai_map(file)
+    if suffix == ".svg":
+        return read_svg_map(file, resolution=settings.resolution, margin=settings.margin)
     raise MapError(
         f"{file}: unknown kind of map file; known are {', '.join(SUFFIXES)} (images), .yaml and "
-        f".yml (ROS map_server), .map (MovingAI) and {BUNDLED}NAME"
+        f".yml (ROS map_server), .map (MovingAI), .svg (convex polygons) and {BUNDLED}NAME"
     )
+
+
+def map_files(path: str | os.PathLike[str]) -> list[Path]:
+    """Return the files that a map is read from: the one that is given, and what it names.
+
+    Args:
+        path: a file for :func:`read_map`; none for ``bundled:NAME``.
+
+    Example:
+        >>> map_files("bundled:maze"), [file.name for file in map_files("maps/hall.png")]
+        ([], ['hall.png'])
+    """
+    if str(path).startswith(BUNDLED):
+        return []
+    file = Path(path)
+    if file.suffix.lower() in _YAML_SUFFIXES:
+        with suppress(MapError):  # raised again when it is read
+            return [file, image_of_ros_map(file)]
+    return [file]
 
 
 def bundled_maps() -> tuple[str, ...]:

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import show
 from .image_headers import BrokenImageError, truncated
 
 #: What the files begin with.
@@ -26,6 +27,7 @@ _MAX_HEADER = 2**16
 
 # Bytes of a plain file that are split into numbers at a time, and the digits of a number.
 _BLOCK, _MAX_DIGITS = 2**20, 32
+_IS_SPACE = np.isin(np.arange(256), list(b" \t\n\v\f\r"))
 
 
 def decode_netpbm(
@@ -85,26 +87,62 @@ def decode_netpbm(
 
 def _read_numbers(text: bytes, count: int, white: int, name: str) -> NDArray[np.uint8 | np.uint16]:
     """Return the first numbers of a text, not more than ``count``."""
-    if b"#" in text:
-        text = re.sub(rb"#[^\n]*", b"", text)
     levels: NDArray[Any] = np.empty(count, np.uint8 if white < 256 else np.uint16)
     space = re.compile(rb"\s")
-    filled = at = 0
+    filled, at, in_comment = 0, 0, False
     while filled < count and at < len(text):
-        after = space.search(text, at + _BLOCK)
-        end = len(text) if after is None else after.start()
-        words = text[at : min(end, at + _BLOCK + _MAX_DIGITS + 1)].split()[: count - filled]
+        after = space.search(text, at + _BLOCK, at + _BLOCK + _MAX_DIGITS + 1)
+        end = at + _BLOCK + _MAX_DIGITS + 1 if after is None else after.start()
+        codes, in_comment = _blank_comments(np.frombuffer(text[at:end], np.uint8), in_comment)
+        numbers = _parse_numbers(codes, count - filled, name)
         at = end
-        try:
-            if max(map(len, words), default=0) > _MAX_DIGITS:
-                raise ValueError("a number has too many digits")
-            numbers = np.array(words, dtype=np.int64)
-        except Exception as error:  # NumPy raises several kinds
-            raise BrokenImageError(
-                f"the {name} holds something that is no number: {error}"
-            ) from error
-        if numbers.size and not (numbers.min() >= 0 and numbers.max() <= white):
+        if numbers.size and numbers.max() > white:
             raise BrokenImageError(f"the {name} holds levels outside 0 to {white}")
         levels[filled : filled + len(numbers)] = numbers
         filled += len(numbers)
     return levels[:filled]
+
+
+def _blank_comments(codes: NDArray[np.uint8], in_comment: bool) -> tuple[NDArray[np.uint8], bool]:
+    """Return a text with spaces in place of comments, and whether it ends in one.
+
+    Args:
+        codes: the text.
+        in_comment: whether it begins in one.
+    """
+    is_hash = codes == ord("#")
+    if not (in_comment or is_hash.any()):
+        return codes, False
+    places = np.arange(1, len(codes) + 1)
+    last_hash = np.maximum.accumulate(np.where(is_hash, places, 0))
+    last_line_end = np.maximum.accumulate(np.where(codes == ord("\n"), places, -int(in_comment)))
+    is_comment = last_hash > last_line_end
+    return np.where(is_comment, np.uint8(ord(" ")), codes), bool(is_comment[-1])
+
+
+def _parse_numbers(codes: NDArray[np.uint8], count: int, name: str) -> NDArray[np.int64]:
+    """Return the first numbers of a text, not more than ``count``.
+
+    What is beyond 10^16 comes out too small, but beyond 10^16 as well. All numbers are
+    computed at once: their last digits, then the tens of those that have some, and so on, in a
+    fifth of the time that splitting the text into words takes.
+    """
+    digits = codes - np.uint8(ord("0"))
+    is_digit = digits < 10
+    steps = np.diff(is_digit.view(np.int8), prepend=0, append=0)
+    ends = np.flatnonzero(steps == -1)[:count]
+    lengths = ends - np.flatnonzero(steps == 1)[:count]
+    # What follows the last number that is wanted is not looked at.
+    used = slice(int(ends[-1]) + 1 if len(ends) == count else None)
+    is_odd = ~(is_digit[used] | _IS_SPACE[codes[used]])
+    if is_odd.any():
+        odd = codes[int(is_odd.argmax()) :][:20].tobytes()
+        raise BrokenImageError(f"the {name} holds something that is no number: {show(odd)}")
+    longest = int(lengths.max(initial=0))
+    if longest > _MAX_DIGITS:
+        raise BrokenImageError(f"the {name} holds a number with too many digits, {longest}")
+    numbers: NDArray[np.int64] = digits[ends - 1].astype(np.int64)
+    for place in range(1, longest):
+        longer = np.flatnonzero(lengths > place)
+        numbers[longer] += digits[ends[longer] - 1 - place] * np.int64(10 ** min(place, 16))
+    return numbers

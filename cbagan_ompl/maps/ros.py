@@ -13,25 +13,31 @@ A planner needs a yes or no, so only free pixels are free: unknown and partly oc
 blocked, or free with ``unknown_is_free``.
 
 Beware of the gray level 205, p = 0.196, that map savers write for unknown: it is unknown with
-``free_thresh: 0.196``, but free with the 0.25 that many maps have.
+``free_thresh: 0.196``, but free with the 0.25 that nav2's own map saver writes. A warning says so
+where a map has many such pixels.
 """
 
 from __future__ import annotations
 
+import warnings
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..common.files import read_bytes
 from ..common.yaml_text import MAX_YAML_BYTES, parse_yaml
-from ..errors import MapError, show
+from ..errors import CbaganOmplWarning, MapError, show
 from .image_files import MAX_IMAGE_BYTES, DecodedImage, decode_image
 from .raw_map import RawMap
 
 _REQUIRED = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
 _MODES = ("trinary", "scale", "raw")
+
+# What map savers write for unknown, of 255, and the fraction of the pixels that is worth a warning.
+_UNKNOWN_GRAY, _MANY = 205, 0.01
 
 
 class _Description:
@@ -110,15 +116,32 @@ class _Description:
         return mode.lower()
 
     @property
-    def image(self) -> DecodedImage:
+    def image_path(self) -> Path:
+        """Of the image; the one in the file is relative to its folder."""
         file = self.keys["image"]
         if not isinstance(file, str) or not file:
             raise self.error("image", "must be the path of an image, relative to this file")
-        path = self.path.parent / Path(file).expanduser()
+        try:
+            return self.path.parent / Path(file).expanduser()
+        except RuntimeError as error:
+            raise self.error("image", f"the home of this user is not known: {error}") from error
+
+    @property
+    def image(self) -> DecodedImage:
+        path = self.image_path
         try:
             return decode_image(read_bytes(path, limit=MAX_IMAGE_BYTES), str(path))
         except MapError as error:
             raise self.error("image", str(error)) from error
+
+
+def image_of_ros_map(path: Path) -> Path:
+    """Return the path of the image that a map_server YAML file names.
+
+    Raises:
+        MapError: the file cannot be read, or is no such file.
+    """
+    return _Description(path).image_path
 
 
 def read_ros_map(path: Path, *, unknown_is_free: bool) -> RawMap:
@@ -148,6 +171,8 @@ def read_ros_map(path: Path, *, unknown_is_free: bool) -> RawMap:
     else:
         level_is_free = occupancy <= free_thresh
     free = image.look_up(level_is_free)
+    if mode != "raw" and not (negate or unknown_is_free):
+        _warn_of_free_unknown(image, level_is_free, path, free_thresh)
     # What lies between the thresholds is partly occupied in scale mode, not unknown.
     between = (occupancy > free_thresh) & (occupancy < occupied_thresh) & (mode != "scale")
     unknown = image.look_up(between | (occupancy > 1))
@@ -160,3 +185,20 @@ def read_ros_map(path: Path, *, unknown_is_free: bool) -> RawMap:
             f"free_thresh {free_thresh:g}; if all are unknown, try unknown_is_free"
         )
     return RawMap(free, path.stem, resolution, origin, unknown if unknown.any() else None)
+
+
+def _warn_of_free_unknown(
+    image: DecodedImage, level_is_free: NDArray[np.bool_], path: Path, free_thresh: float
+) -> None:
+    level = _UNKNOWN_GRAY * image.white // 255
+    fraction = float((image.gray == level).mean())
+    if level_is_free[level] and fraction >= _MANY:
+        warnings.warn(
+            CbaganOmplWarning(
+                f"{path}: {fraction:.0%} of the pixels have the gray level {_UNKNOWN_GRAY}, which "
+                f"map savers write for unknown, and count as free with free_thresh {free_thresh:g},"
+                " as in nav2: write free_thresh: 0.196 to block them, or say that unknown space is "
+                "free"
+            ),
+            stacklevel=5,
+        )

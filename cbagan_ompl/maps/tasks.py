@@ -9,13 +9,15 @@ from importlib import resources
 from math import isfinite
 from pathlib import Path, PureWindowsPath
 
-from ..common.files import read_text
+from ..common.files import as_path, read_text
 from ..errors import MapError, show
+from .checks import check_grid
 from .grid_map import GridMap
 from .loading import BUNDLED, bundled_folder
 from .movingai import MAX_TASK_BYTES, MAX_TASKS, read_scenarios
 
 _COLUMNS = ("map", "start_x", "start_y", "goal_x", "goal_y")
+_YAWS = ("start_yaw", "goal_yaw")
 
 
 @dataclass(frozen=True)
@@ -23,8 +25,8 @@ class Task:
     """Where to plan from and to.
 
     Attributes:
-        start: (x, y) in the map's world coordinates.
-        goal: (x, y) in the map's world coordinates.
+        start: (x, y) in the map's world coordinates, or (x, y, yaw) with a yaw in radians.
+        goal: the same; both have a yaw or none has.
         optimal_cost: length of the shortest path in world units, where it is known.
         family: the kind of map that it is on, where that is known.
 
@@ -33,8 +35,8 @@ class Task:
         True
     """
 
-    start: tuple[float, float]
-    goal: tuple[float, float]
+    start: tuple[float, ...]
+    goal: tuple[float, ...]
     optimal_cost: float | None = None
     family: str | None = None
 
@@ -49,7 +51,8 @@ def load_tasks(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
     and a path in any direction may be shorter.
 
     A ``.csv`` file has the columns ``map, start_x, start_y, goal_x, goal_y`` in any order,
-    optionally ``optimal_cost`` and ``family``, and any others, which are not read. ``map`` is the
+    optionally ``start_yaw`` and ``goal_yaw`` (radians, for robots with heading),
+    ``optimal_cost`` and ``family``, and any others, which are not read. ``map`` is the
     file or the name of a map; rows of other maps than ``grid`` are left out. Coordinates are world
     ones.
 
@@ -73,7 +76,8 @@ def load_tasks(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
         >>> tasks[0].goal
         (3.0, 4.0)
     """
-    file = Path(path)
+    check_grid(grid)
+    file = as_path(path, MapError)
     suffix = file.suffix.lower()
     if suffix == ".scen":
         return _scen_tasks(file, grid)
@@ -82,7 +86,7 @@ def load_tasks(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
     raise MapError(f"{file}: unknown kind of task file; known are .scen and .csv")
 
 
-def tasks_of(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
+def tasks_of(path: str | os.PathLike[str], grid: GridMap, *, with_yaw: bool = False) -> list[Task]:
     """Return the tasks that come with a map.
 
     These are those of the package for ``bundled:NAME``, and those in ``NAME.map.scen`` or
@@ -91,6 +95,8 @@ def tasks_of(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
     Args:
         path: what the map was loaded from.
         grid: the map.
+        with_yaw: return tasks for robots with heading. Those of the bundled maps are for a car of
+            8 x 4 pixels that drives backwards too, with a turning radius of 6 pixels.
 
     Returns:
         The tasks, none for other maps.
@@ -103,14 +109,29 @@ def tasks_of(path: str | os.PathLike[str], grid: GridMap) -> list[Task]:
         >>> len(tasks_of("bundled:maze", GridMap.load("bundled:maze")))
         4
     """
+    check_grid(grid)
+    file = as_path(path, MapError)
     if str(path).startswith(BUNDLED):
-        with resources.as_file(bundled_folder() / "tasks.csv") as file:
-            return load_tasks(file, grid)
+        name = "car_tasks.csv" if with_yaw else "tasks.csv"
+        with resources.as_file(bundled_folder() / name) as tasks:
+            return load_tasks(tasks, grid)
+    if with_yaw:
+        return []
+    files = task_files(file)
+    return load_tasks(files[0], grid) if files else []
+
+
+def task_files(path: str | os.PathLike[str]) -> list[Path]:
+    """Return the file of the tasks that lies beside a MovingAI map, in a list; none for others.
+
+    Args:
+        path: of the map.
+    """
     file = Path(path)
     if file.suffix.lower() == ".map":
         for beside in (Path(f"{file}.scen"), file.with_suffix(".scen")):
             if os.path.isfile(beside):  # False also where the name is too long to be one
-                return load_tasks(beside, grid)
+                return [beside]
     return []
 
 
@@ -170,10 +191,15 @@ def _csv_tasks(path: Path, grid: GridMap) -> list[Task]:
 
 def _csv_task(location: str, row: dict[str, str]) -> Task:
     start_x, start_y, goal_x, goal_y = (_number(location, row, name) for name in _COLUMNS[1:])
+    given = [name for name in _YAWS if row.get(name, "").strip()]
+    if len(given) == 1:
+        raise MapError(f"{location}: {' and '.join(_YAWS)} come together, only {given[0]} is given")
+    yaws = [_number(location, row, name) for name in given]
     cost = _number(location, row, "optimal_cost") if row.get("optimal_cost", "").strip() else None
     if cost is not None and cost < 0:
         raise MapError(f"{location}: optimal_cost is a length and cannot be {cost:g}")
-    return Task((start_x, start_y), (goal_x, goal_y), cost, row.get("family") or None)
+    start, goal = (start_x, start_y, *yaws[:1]), (goal_x, goal_y, *yaws[1:])
+    return Task(start, goal, cost, row.get("family") or None)
 
 
 def _number(location: str, row: dict[str, str], column: str) -> float:

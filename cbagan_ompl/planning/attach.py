@@ -8,16 +8,19 @@ from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Any
 
-from ..errors import PlannerError, show
+from ..errors import PlannerError
 from ..sampling.adaptation import AdaptiveMixture
 from ..sampling.budget import ADVANCE_WITH_TREE, EARNED_BY_UNIFORM_UNSEEN, LearnedBudget
-from ..sampling.heatmap import Heatmap, check_heatmap
+from ..sampling.checks import check_heatmap
+from ..sampling.headings import HeadingSampler
+from ..sampling.heatmap import Heatmap
 from ..sampling.options import OPTIMIZING_SHARPNESS, SamplerOptions
 from ..sampling.roadmap import RoadmapMixture
 from ..sampling.sampler import HeatmapSampler
 from . import compat, ompl_samplers
+from .attachable import check_task, planner_of, setup_of
 from .bounds_steering import SteeringMonitor
-from .compat import ob, og, ou
+from .compat import ou
 from .goal_injection import InjectedGoal
 from .goal_monitor import GoalMonitor, goal_monitor
 from .hooks import (
@@ -32,8 +35,9 @@ from .hooks import (
     stops_at_first,
     wants_sharp,
 )
-from .monitor import PlannerMonitor, is_informed, is_monitored, release_forgotten
-from .states import StateAccess, position_bounds, state_access
+from .monitor import PlannerMonitor, is_informed, release_forgotten
+from .pose_headings import with_headings
+from .states import StateAccess, drives_backwards, position_bounds, state_access
 from .steered_callbacks import install_steering
 
 # OMPL's range of a planner that was given none, as a fraction of the extent of the space.
@@ -52,10 +56,12 @@ class Attachment:
         >>> from ompl import geometric as og, util as ou
         >>> from cbagan_ompl import GridMap, Heatmap, tasks_of
         >>> from cbagan_ompl.planning.problem import make_setup
+        >>> from cbagan_ompl.planning.workspace import Workspace
         >>> ou.setLogLevel(ou.LOG_NONE)
         >>> grid = GridMap.load("bundled:maze")
         >>> task = tasks_of("bundled:maze", grid)[0]
-        >>> setup = make_setup(grid, grid.check_task(task.start, task.goal), tolerance=1.0)
+        >>> endpoints = grid.check_task(task.start, task.goal)
+        >>> setup = make_setup(Workspace(grid), endpoints, tolerance=1.0)
         >>> setup.setPlanner(og.RRTstar(setup.getSpaceInformation()))
         >>> attachment = attach(setup, Heatmap.uniform(grid))
         >>> attachment.hook, attachment.sample_counts
@@ -64,9 +70,16 @@ class Attachment:
     """
 
     def __init__(
-        self, hook: str, sampler: HeatmapSampler, monitor: PlannerMonitor, undo: Callable[[], None]
+        self,
+        hook: str,
+        sampler: HeatmapSampler,
+        monitor: PlannerMonitor,
+        goal: Any,
+        undo: Callable[[], None],
     ) -> None:
         self.hook = hook
+        # Kept, because whoever plans to it does not keep it.
+        self._goal = goal
         self._sampler = sampler
         self._monitor = monitor
         self._undo: Callable[[], None] | None = undo
@@ -84,7 +97,8 @@ class Attachment:
 
         Raises:
             PlannerError: the planner is in the middle of a solve, from one of whose callbacks this
-                is called: it would go on in a tree that is no more.
+                is called: it would go on in a tree that is no more. That is known of the setup's
+                ``solve``, and of any other once it has asked for a sample.
         """
         if self._undo is not None and self._monitor.is_planning(sys._getframe(1)):
             raise PlannerError(
@@ -117,20 +131,24 @@ class Attachment:
 def attach(
     setup: Any, heatmap: Heatmap, options: SamplerOptions | None = None, **changes: Any
 ) -> Attachment:
-    """Make the planner of a SimpleSetup sample a heat map.
+    """Make a planner sample a heat map.
 
     Call it after ``setup.setPlanner(...)`` and after the planner's options, the start and the
     goal were set. What the planner has done so far is cleared, because samplers that it has made
     go only with its tree. Its options stay as they are but for what the hook needs: the goal bias
     under goal injection, and for informed sampling under a StateSampler, rejection instead of
-    direct sampling. For another start or goal: detach, set it, attach again. Planners other than
-    the attached one get the goal itself, also while it is attached. Until
-    :meth:`Attachment.detach` the setup, the planner and the heat map keep each other alive; where
-    nothing else refers to them any more, they are let go by the next ``attach`` or by Python's
-    garbage collector.
+    direct sampling. For another start or goal: detach, set it, attach again; a solve of a setup
+    whose goal was replaced meanwhile raises an error. Planners other than the attached one get the
+    goal itself, also while it is attached. Until :meth:`Attachment.detach` the setup, the planner
+    and the heat map keep each other alive; where nothing else refers to them any more, they are let
+    go by the next ``attach`` or by Python's garbage collector. That does not see references through
+    OMPL: if a validity checker refers to its own setup, or an attribute of the setup to the
+    attachment, only ``detach`` lets go of them.
 
     Args:
-        setup: an ``ompl.geometric.SimpleSetup``.
+        setup: an ``ompl.geometric.SimpleSetup``, or a geometric planner with its problem
+            definition, where there is no setup. The solves of such a planner are not watched on
+            OMPL 2.0: a goal that is replaced while it is attached is not noticed there.
         heatmap: what to sample, in the coordinates of the setup's space.
         options: how samples follow the heat map. ``sharpness`` None stands for 1 with planners that
             stop at their first path other than RRTConnect, and for
@@ -143,9 +161,10 @@ def attach(
         A handle with ``.hook``, ``.sample_counts`` and ``.detach()``.
 
     Raises:
-        PlannerError: ``setup`` is no SimpleSetup, no planner is set, no hook of this build reaches
-            it, it samples a heat map already, its space has no (x, y), the start or goal is
-            missing, or the goal cannot be sampled.
+        PlannerError: ``setup`` is neither, no planner is set, no hook of this build reaches it, it
+            is written in Python or plans controls, it samples a heat map already, its space has no
+            (x, y), the start or goal is missing, or the goal cannot be sampled.
+        TaskError: the start is outside or in an obstacle of the heat map's map.
         HeatmapError: not a :class:`Heatmap`, or one that is 0 everywhere in the bounds of the
             space.
         ConfigError: an option that makes no sense, see :class:`SamplerOptions`.
@@ -154,10 +173,12 @@ def attach(
         >>> from ompl import base as ob, geometric as og, util as ou
         >>> from cbagan_ompl import GridMap, GridValidityChecker, Heatmap, tasks_of
         >>> from cbagan_ompl.planning.problem import make_setup
+        >>> from cbagan_ompl.planning.workspace import Workspace
         >>> ou.setLogLevel(ou.LOG_NONE)
         >>> grid = GridMap.load("bundled:rooms")
         >>> task = tasks_of("bundled:rooms", grid)[0]
-        >>> setup = make_setup(grid, grid.check_task(task.start, task.goal), tolerance=1.0)
+        >>> endpoints = grid.check_task(task.start, task.goal)
+        >>> setup = make_setup(Workspace(grid), endpoints, tolerance=1.0)
         >>> setup.setPlanner(og.RRT(setup.getSpaceInformation()))
         >>> with attach(setup, Heatmap.corridor(grid, task.start, task.goal), seed=0) as attachment:
         ...     _ = setup.solve(5.0)
@@ -166,8 +187,8 @@ def attach(
     """
     options = SamplerOptions.of(options, changes)
     check_heatmap(heatmap)
-    planner = _planner_of(setup)
-    _check_attachable(setup, planner)
+    setup = setup_of(setup)
+    planner = planner_of(setup)
     name = class_name(planner)
     hook = hook_of(name)
     if options.sharpness is None:
@@ -175,8 +196,11 @@ def attach(
         options = replace(options, sharpness=sharpness)
     rng = options.generator()
     space = setup.getStateSpace()
-    states = state_access(space, rng)
     release_forgotten()
+    check_task(setup, heatmap, state_access(space))
+    heatmap = with_headings(setup, heatmap, options.heading)
+    headings = HeadingSampler(heatmap, options.heading, rng, drives_backwards(space))
+    states = state_access(space, headings)
     monitor = _MONITORS.get(hook, PlannerMonitor)(setup, states)
     budget = _budget_of(planner, name, hook) if options.adaptation.stagnation else None
     mixture: AdaptiveMixture | RoadmapMixture | None = None
@@ -196,40 +220,13 @@ def attach(
 
     def undo() -> None:
         monitor.release()
-        planner.clear()  # first: a planner without samplers makes none while its options change
+        # First: a planner without samplers makes none while its options change. One without a tree
+        # has none; it may be looking at its start, at the beginning of a solve that is not watched.
+        if compat.planner_data(planner).numVertices() > 0:
+            planner.clear()
         undo_hook()
 
-    return Attachment(hook, sampler, monitor, undo)
-
-
-def _planner_of(setup: Any) -> Any:
-    """Return the planner of a setup, which may be None; raise if it is no setup."""
-    if not isinstance(setup, og.SimpleSetup):
-        raise PlannerError(
-            f"attach takes an ompl.geometric.SimpleSetup, with its planner, not {show(setup)}"
-        )
-    planner = setup.getPlanner()
-    if planner is not None and setup.getPlanner() is not planner:
-        # OMPL 1.x makes a new object at each call for a planner that C++ has made. One that was
-        # set stays the same.
-        setup.setPlanner(planner)
-    return planner
-
-
-def _check_attachable(setup: Any, planner: Any) -> None:
-    if planner is None:
-        raise PlannerError("attach needs a planner: call setup.setPlanner(...) first")
-    if setup.getGoal() is None or setup.getProblemDefinition().getStartStateCount() == 0:
-        raise PlannerError("attach needs the task: set the start and the goal of the setup first")
-    if not isinstance(setup.getGoal(), ob.GoalSampleableRegion):
-        raise PlannerError(
-            "attach needs a goal that can be sampled, such as a GoalState or GoalStates, this one "
-            f"is a {type(setup.getGoal()).__name__}"
-        )
-    if is_monitored(planner):
-        raise PlannerError(
-            "this planner samples a heat map already: call detach() of its attachment first"
-        )
+    return Attachment(hook, sampler, monitor, setup.getGoal(), undo)
 
 
 def _reach_of(planner: Any) -> float:
@@ -312,6 +309,7 @@ def _inject_goals(wiring: _Wiring) -> Callable[[], None]:
     assert isinstance(wiring.monitor, GoalMonitor)
     injected = InjectedGoal(si, original, wiring.states, wiring.sampler, wiring.monitor)
     setup.setGoal(injected)
+    wiring.monitor.injected_goal = injected
     wiring.monitor.set_injected_fraction(1.0)
 
     def undo() -> None:

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from importlib.metadata import PackageNotFoundError, version
 from threading import Lock
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.versions import ompl_version
 from ..errors import MissingDependencyError, PlannerError, show
 
 try:
@@ -32,7 +32,15 @@ from ompl import geometric as og  # noqa: E402
 from ompl import tools as ot  # noqa: E402
 from ompl import util as ou  # noqa: E402
 
-__all__ = ["BINDINGS", "BOOST_PYTHON", "HAS_STATE_SAMPLER_ALLOCATOR", "ob", "og", "ou"]
+__all__ = [
+    "BINDINGS",
+    "BOOST_PYTHON",
+    "HAS_STATE_SAMPLER_ALLOCATOR",
+    "ob",
+    "og",
+    "ompl_version",
+    "ou",
+]
 
 #: Whether planners can be given a StateSampler (OMPL 1.7; not bound in 2.0.0 and 2.0.1).
 HAS_STATE_SAMPLER_ALLOCATOR = hasattr(ob.StateSpace, "setStateSamplerAllocator")
@@ -43,14 +51,6 @@ _BROKEN = {"AORRTC", "LazyLBTRRT"} | ({"ABITstar", "AITstar", "BITstar"} if BOOS
 
 # Planners for other spaces than those of a map.
 _OTHER_SPACES = frozenset({"STRRTstar"})
-
-
-def ompl_version() -> str:
-    """Return the version of the installed OMPL package; "unknown" for a build without metadata."""
-    try:
-        return version("ompl")
-    except PackageNotFoundError:
-        return "unknown"
 
 
 def _wrap(wrapper: str, function: Callable[..., Any], home: Any = ob) -> Any:
@@ -106,10 +106,7 @@ def plane_space(low: NDArray[np.float64], high: NDArray[np.float64]) -> Any:
         low: lower bounds, shape (2,).
         high: upper bounds, shape (2,).
     """
-    bounds = ob.RealVectorBounds(2)
-    for axis in range(2):
-        bounds.setLow(axis, float(low[axis]))
-        bounds.setHigh(axis, float(high[axis]))
+    bounds = _bounds(low, high)
     if not BOOST_PYTHON:
         space = ob.RealVectorStateSpace(2)
         space.setBounds(bounds)
@@ -117,6 +114,34 @@ def plane_space(low: NDArray[np.float64], high: NDArray[np.float64]) -> Any:
     owner = ob.SE2StateSpace()
     owner.setBounds(bounds)
     return owner.getSubspace(0)
+
+
+def _bounds(low: NDArray[np.float64], high: NDArray[np.float64]) -> Any:
+    bounds = ob.RealVectorBounds(2)
+    for axis in range(2):
+        bounds.setLow(axis, float(low[axis]))
+        bounds.setHigh(axis, float(high[axis]))
+    return bounds
+
+
+def pose_space(
+    name: str,
+    turning_radius: float | None,
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+) -> Any:
+    """Return an SE2StateSpace, DubinsStateSpace or ReedsSheppStateSpace.
+
+    Args:
+        name: of the class.
+        turning_radius: of the curves; None for SE2StateSpace.
+        low: lower bounds of positions, shape (2,).
+        high: upper bounds of positions, shape (2,).
+    """
+    kind = getattr(ob, name)
+    space = kind() if turning_radius is None else kind(float(turning_radius))
+    space.setBounds(_bounds(low, high))
+    return space
 
 
 def new_state(space: Any) -> Any:
@@ -150,6 +175,60 @@ def start_states(planner: Any) -> list[Any]:
     return [data.getStartVertex(i).getState() for i in range(data.numStartVertices())]
 
 
+def valid_starts(
+    problem: Any, si: Any, read: Callable[[Any], tuple[float, float]]
+) -> list[tuple[float, float]]:
+    """Return the positions of start states before a planner has begun to plan.
+
+    On OMPL 2.0 they are those that a goal is asked about, which are valid: see
+    :func:`start_states`. Without a validity checker there are none.
+
+    Args:
+        problem: an ``ob.ProblemDefinition`` with a goal.
+        si: its space information.
+        read: returns the position of a state.
+    """
+    if BOOST_PYTHON:
+        return [read(problem.getStartState(i)) for i in range(problem.getStartStateCount())]
+    if si.getStateValidityChecker() is None:
+        return []
+    goal, asked = problem.getGoal(), _AskedGoal(si, read)
+    problem.setGoal(asked)
+    try:
+        problem.isTrivial()
+    finally:
+        problem.setGoal(goal)
+    return asked.positions
+
+
+class _AskedGoal(ob.GoalRegion):  # type: ignore[misc]
+    """A goal that nothing is in, which notes what it is asked about."""
+
+    def __init__(self, si: Any, read: Callable[[Any], tuple[float, float]]) -> None:
+        super().__init__(si)
+        self.positions: list[tuple[float, float]] = []
+        self._read = read
+
+    def distanceGoal(self, state: Any) -> float:  # noqa: N802
+        self.positions.append(self._read(state))
+        return 1.0e300
+
+
+def plans_controls(value: Any) -> bool:
+    """Return whether a value is of ``ompl.control``, where planners have geometric ones' names."""
+    return any(".control" in module for module in _ompl_modules(value))
+
+
+def is_written_in_python(planner: Any) -> bool:
+    """Return whether a planner is a Python subclass of ``ob.Planner`` itself."""
+    return not any(".geometric" in module for module in _ompl_modules(planner))
+
+
+def _ompl_modules(value: Any) -> list[str]:
+    names = [kind.__module__ for kind in type(value).__mro__]
+    return [name for name in names if name.split(".")[0] == "ompl"]
+
+
 def clear_valid_state_sampler(si: Any) -> None:
     """Go back to OMPL's own valid-state sampler."""
     if BOOST_PYTHON:
@@ -173,16 +252,15 @@ def is_exact(status: Any) -> bool:
     return bool(status.getStatus() == ob.PlannerStatus.EXACT_SOLUTION)
 
 
-def path_positions(path: Any) -> NDArray[np.float64]:
-    """Return the states of a geometric path in the plane, (N, 2)."""
-    return np.array([(state[0], state[1]) for state in path.getStates()])
+def tree_edges(data: Any, read: Callable[[Any], tuple[float, float]]) -> NDArray[np.float64]:
+    """Return the edges of an ``ob.PlannerData`` in the plane, (M, 2, 2).
 
-
-def tree_edges(data: Any) -> NDArray[np.float64]:
-    """Return the edges in the plane of an ``ob.PlannerData``, (M, 2, 2)."""
+    Args:
+        data: from :func:`planner_data`.
+        read: returns the (x, y) of a state.
+    """
     count = data.numVertices()
-    states = [data.getVertex(i).getState() for i in range(count)]
-    points = np.array([(state[0], state[1]) for state in states]).reshape(-1, 2)
+    points = np.array([read(data.getVertex(i).getState()) for i in range(count)]).reshape(-1, 2)
     pairs = [(i, j) for i in range(count) for j in _edges_from(data, i)]
     return points[np.array(pairs, dtype=np.intp).reshape(-1, 2)]
 

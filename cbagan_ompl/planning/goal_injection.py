@@ -68,9 +68,15 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
         return _ENDLESS if monitor.is_sampling() else int(self._original.maxSampleCount())
 
     def couldSample(self) -> bool:  # noqa: N802
-        """Return True, as the original does; the planners that injection is for never ask."""
+        """Return what the original does; the planners that injection is for never ask."""
         self._monitor.note_other()
-        return True
+        return bool(self._original.couldSample())
+
+    def __getattr__(self, name: str) -> Any:
+        """Return what only the original has, such as the ``getState`` of a GoalState."""
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return getattr(self._original, name)
 
     def sampleGoal(self, state: Any) -> None:  # noqa: N802
         """Sample the heat map for the planner, the original goal for other callers."""
@@ -86,5 +92,9 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
             self._states.write(state, *self._sampler.next())
 
     def _is_goals_turn(self) -> bool:
-        """Return whether the true goal is due, as often as with OMPL's own goal bias."""
-        return self._sampler.chance() * self._monitor.injected_fraction < _GOAL_BIAS
+        """Return whether the true goal is due, as often as with OMPL's own goal bias.
+
+        It never is while it has no samples, as one that is still looking for them.
+        """
+        is_due = self._sampler.chance() * self._monitor.injected_fraction < _GOAL_BIAS
+        return is_due and self._original.maxSampleCount() > 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib.util import find_spec
 from os import PathLike
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import ConfigError, ModelError, show
 from ..maps.grid_map import GridMap
+from ..maps.grid_search import COMPILED, SCIPY, prepare_search, search_kind
 from ..sampling.heatmap import Heatmap
 
 if TYPE_CHECKING:
@@ -21,13 +23,24 @@ UNIFORM = "uniform"
 #: The sampler of a network: the bundled model, unless another one is given.
 LEARNED = "learned"
 
+#: The sampler of a grid search.
+CORRIDOR = "corridor"
+
+#: Whichever of the two makes its heat map sooner on a map, see :func:`resolve_auto`.
+AUTO = "auto"
+
 #: Every sampler by its name, with what it samples.
 SAMPLERS = {
     LEARNED: "the heat map of a network",
     UNIFORM: "OMPL's own, untouched",
-    "corridor": "a band around the path of a grid search",
+    CORRIDOR: "a band around the path of a grid search",
     "straight-line": "a band around the straight line from start to goal",
+    AUTO: "learned or corridor, whichever is there sooner on a map of this size",
 }
+
+# Pixels up to which the grid search makes its heat map sooner than the network, by what searches;
+# measured by scripts/search_speed.py, see docs/results/choices.md.
+_MOST_CORRIDOR_PIXELS = {COMPILED: 1200 * 1200, SCIPY: 150 * 150}
 
 #: What a result names its sampler when the caller brought the heat map.
 OWN_HEATMAP = "heatmap"
@@ -36,15 +49,35 @@ OWN_HEATMAP = "heatmap"
 HeatmapSource = Callable[[GridMap, ArrayLike, ArrayLike], Heatmap]
 
 
+def is_auto(sampler: object) -> bool:
+    """Return whether a sampler is :data:`AUTO`, and :func:`resolve_auto` has to be asked."""
+    return isinstance(sampler, str) and sampler == AUTO
+
+
+def resolve_auto(grid: GridMap) -> str:
+    """Return the sampler that :data:`AUTO` stands for on a map.
+
+    That is the corridor on maps up to a size, and where torch is not installed; else learned.
+
+    Example:
+        >>> resolve_auto(GridMap(np.ones((64, 64), bool)))
+        'corridor'
+    """
+    is_small = grid.free.size <= _MOST_CORRIDOR_PIXELS[search_kind()]
+    return CORRIDOR if is_small or find_spec("torch") is None else LEARNED
+
+
 def heatmap_source(
     sampler: str,
     model: Predictor | str | PathLike[str] | None = None,
     heatmap: Heatmap | ArrayLike | None = None,
 ) -> tuple[str, HeatmapSource | None]:
-    """Return the name of a sampler, and what makes its heat map; a model is loaded here, once.
+    """Return the name of a sampler, and what makes its heat map.
+
+    A model is loaded here, once, and so is the grid search.
 
     Args:
-        sampler: one of :data:`SAMPLERS`.
+        sampler: one of :data:`SAMPLERS`, but for ``"auto"``: see :func:`resolve_auto`.
         model: for the learned sampler, a loaded model or the file of one; the bundled model by
             default.
         heatmap: to be sampled in place of the learned one.
@@ -66,19 +99,35 @@ def heatmap_source(
     if model is not None and heatmap is not None:
         raise ConfigError("a model and a heat map were both given: choose one")
     if heatmap is not None:
-        values = heatmap.values if isinstance(heatmap, Heatmap) else heatmap
-        return OWN_HEATMAP, lambda grid, start, goal: Heatmap(values, grid)
+        return OWN_HEATMAP, lambda grid, start, goal: _on_grid(heatmap, grid)
     if sampler == LEARNED:
-        from ..inference.predictor import Predictor, load_model
+        return sampler, loaded_model(model).predict
+    if sampler == CORRIDOR:
+        prepare_search()
+    return sampler, None if sampler == UNIFORM else _CONTROLS[sampler]
 
-        if not isinstance(model, Predictor | str | PathLike | None):
-            raise ModelError(f"model is a loaded model or the file of one, got {show(model)}")
-        return sampler, (model if isinstance(model, Predictor) else load_model(model)).predict
-    return sampler, _CONTROLS.get(sampler)
+
+def loaded_model(model: Predictor | str | PathLike[str] | None = None) -> Predictor:
+    """Return a model, loaded where it is a file; the bundled model for None.
+
+    Raises:
+        ModelError: neither a model nor the file of one.
+    """
+    from ..inference.predictor import Predictor, load_model
+
+    if not isinstance(model, Predictor | str | PathLike | None):
+        raise ModelError(f"model is a loaded model or the file of one, got {show(model)}")
+    return model if isinstance(model, Predictor) else load_model(model)
+
+
+def _on_grid(heatmap: Heatmap | ArrayLike, grid: GridMap) -> Heatmap:
+    if not isinstance(heatmap, Heatmap):
+        return Heatmap(heatmap, grid)
+    return heatmap if heatmap.grid is grid else Heatmap(heatmap.values, grid, heatmap.heading)
 
 
 # The heat maps that need no model.
 _CONTROLS: dict[str, HeatmapSource] = {
-    "corridor": Heatmap.corridor,
+    CORRIDOR: Heatmap.corridor,
     "straight-line": Heatmap.straight_line,
 }

@@ -14,10 +14,13 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import PlannerError
 from ..sampling.heatmap import Heatmap
 from ..sampling.informed_set import InformedSet
 from .compat import best_cost, new_state, ob, planner_data, start_states, typed_state
-from .states import StateAccess
+from .solution_cost import SolutionCost
+from .solve_watch import SolveWatch
+from .states import StateAccess, is_distance_bound
 
 # A goal region without end is represented by this many samples of it in the informed set.
 _MAX_GOALS = 100
@@ -46,10 +49,13 @@ class PlannerMonitor:
         self._goal = setup.getGoal()
         self._states = states
         self._is_informed = is_informed(self._planner)
-        self._counts_iterations = hasattr(self._planner, "numIterations")
+        tells_cost = hasattr(self._planner, "numIterations")
+        self._cost = SolutionCost(self._problem) if tells_cost else None
+        self.injected_goal: Any = None
         self.injected_fraction = 1.0
         self._call: tuple[CodeType, int, int] | None = None
         self._paths_at_call = 0
+        self._watches: list[SolveWatch] = []
 
     def note_call(self, caller: FrameType) -> None:
         """Note that OMPL asks for a sample, for :meth:`is_planning`.
@@ -62,14 +68,17 @@ class PlannerMonitor:
             self._call = caller.f_code, id(caller), caller.f_lasti
 
     def is_planning(self, caller: FrameType | None) -> bool:
-        """Return whether the planner is in the middle of a solve, as far as can be seen.
+        """Return whether the planner is in the middle of a solve.
 
-        OMPL does not tell. But a frame that has called OMPL, which has asked for a sample, stands
-        at that call until it returns. Paths are added at the end of a solve alone.
+        That of the setup is watched. Of others, such as the planner's own on OMPL 2.0, OMPL does
+        not tell. But a frame that has called OMPL, which has asked for a sample, stands at that
+        call until it returns. Paths are added at the end of a solve alone.
 
         Args:
             caller: the frame that wants to know; it has called Python, not OMPL.
         """
+        if any(watch.is_solving for watch in self._watches):
+            return True
         if self._call is None or self._problem.getSolutionCount() != self._paths_at_call:
             return False
         stacks: dict[int, FrameType | None] = {**sys._current_frames()}
@@ -87,26 +96,28 @@ class PlannerMonitor:
         return self.best_cost() < inf
 
     def best_cost(self) -> float:
-        """Return the cost of the best solution, infinite before there is one.
+        """Return the cost of the best solution, see :class:`SolutionCost`.
 
         It is always infinite for planners that do not tell it; they stop at their first solution.
         """
-        if self._planner is None or not self._counts_iterations:
-            return inf
-        return best_cost(self._planner)
+        return inf if self._cost is None else self._cost.best(self._planner.bestCost())
 
     def informed_set(self) -> InformedSet | None:
         """Return the informed set of the task, once the planner has begun to plan.
 
-        It is None for planners that are not informed, and where costs are no path lengths.
+        It is None for planners that are not informed, and where costs are no path lengths, or
+        lengths that may be below those of the positions: these are the lower bound.
         """
         objective = self._problem.getOptimizationObjective()
         is_length = isinstance(objective, ob.PathLengthOptimizationObjective)
-        return self._endpoints() if self._is_informed and is_length else None
+        is_bounded = is_length and is_distance_bound(self._setup.getStateSpace())
+        return self._endpoints() if self._is_informed and is_bounded else None
 
     def connects(self, heatmap: Heatmap) -> bool:
         """Return whether a region connects a start with a goal, once planning has begun."""
         endpoints = self._endpoints()
+        if not len(endpoints.goals):
+            return True  # a goal that has no samples yet can be anywhere
         return any(
             heatmap.connects(start, goal) for start in endpoints.starts for goal in endpoints.goals
         )
@@ -124,6 +135,23 @@ class PlannerMonitor:
     def register(self) -> None:
         """Let :func:`is_monitored` and the interpreter's exit know of this monitor."""
         _alive.add(self)
+        targets = [one for one in (self._setup, self._planner) if hasattr(one, "solve")]
+        self._watches = [SolveWatch(target, self.check_goal) for target in targets]
+
+    def check_goal(self) -> None:
+        """Raise if the goal was replaced: the planner would sample nothing but the new one.
+
+        Raises:
+            PlannerError: it was, and the planner samples its goal; see :class:`InjectedGoal`.
+        """
+        if self._problem is None or self.injected_goal is None:
+            return
+        is_set = self._setup.getPlanner() is self._planner
+        if is_set and self._problem.getGoal() is not self.injected_goal:
+            raise PlannerError(
+                "the goal was replaced while the planner samples a heat map for another one: call "
+                "detach() of its attachment, and attach again, with a heat map of the new task"
+            )
 
     def refers_to(self, planner: Any) -> bool:
         """Return whether this is the monitor of a planner."""
@@ -131,16 +159,23 @@ class PlannerMonitor:
 
     def is_forgotten(self) -> bool:
         """Return whether nothing but this monitor and OMPL refers to the setup and its planner."""
-        # Each count includes the argument of the call; the setup's C++ object holds the planner.
+        # Each count includes the argument of the call. The setup holds the planner.
         return (
             self._setup is not None
-            and sys.getrefcount(self._setup) <= 2
-            and sys.getrefcount(self._planner) <= 3
+            and sys.getrefcount(self._setup) <= 2 + self._watch_references(self._setup)
+            and sys.getrefcount(self._planner) <= 3 + self._watch_references(self._planner)
         )
+
+    def _watch_references(self, target: Any) -> int:
+        return sum(watch.references_to(target) for watch in self._watches)
 
     def release(self) -> None:
         """Let go of the planner and its task."""
+        for watch in self._watches:
+            watch.release()
+        self._watches = []
         self._planner = self._problem = self._goal = self._setup = self._call = None
+        self._cost = self.injected_goal = None
 
     def _endpoints(self) -> InformedSet:
         state = new_state(self._planner.getSpaceInformation().getStateSpace())

@@ -14,27 +14,24 @@ from typing import Any
 import numpy as np
 
 from ..common.validation import whole_number
-from ..maps.grid_map import GridMap
 from ..sampling.heatmap import Heatmap
 from ..sampling.options import SamplerOptions
 from . import compat
 from .attach import Attachment, attach
-from .compat import ou
+from .compat import ob, ou
 from .heatmap_sources import HeatmapSource
 from .hooks import check_planner, hangs_at_optimum
 from .interrupt_guard import InterruptGuard
 from .monitor import CostHistory
+from .paths import checked_path, path_cost
 from .problem import (
-    Endpoints,
-    checked_path,
     make_setup,
-    path_length,
     search_to_the_end,
     set_parameter,
     set_range,
     stop_at_optimum,
 )
-from .validity import GridMotionValidator, GridValidityChecker
+from .workspace import Endpoints, Workspace
 
 # Collision checks between two looks at the best cost: about six iterations of RRT*, half a
 # millisecond.
@@ -127,7 +124,10 @@ class RunOptions:
 
 
 def check_variants(
-    grid: GridMap, endpoints: Endpoints, variants: Sequence[PlannerVariant], options: RunOptions
+    workspace: Workspace,
+    endpoints: Endpoints,
+    variants: Sequence[PlannerVariant],
+    options: RunOptions,
 ) -> None:
     """Raise if a variant cannot run; arguments as for :func:`run_benchmark`.
 
@@ -137,12 +137,12 @@ def check_variants(
     """
     for variant in variants:
         check_planner(variant.planner, follows_heatmap=variant.source is not None)
-    BenchmarkSession(grid, endpoints, variants, options, InterruptGuard())
+    BenchmarkSession(workspace, endpoints, variants, options, InterruptGuard())
 
 
 def run_benchmark(
     name: str,
-    grid: GridMap,
+    workspace: Workspace,
     endpoints: Endpoints,
     variants: Sequence[PlannerVariant],
     options: RunOptions,
@@ -156,8 +156,8 @@ def run_benchmark(
 
     Args:
         name: what the experiment is called.
-        grid: the map.
-        endpoints: start and goal, as from :meth:`GridMap.check_task`.
+        workspace: the robot on its map.
+        endpoints: start and goal, as from :meth:`.Workspace.check_task`.
         variants: planners with their samplers.
         options: how often and how long they run.
         after_round: called after each round of runs.
@@ -170,7 +170,7 @@ def run_benchmark(
     """
     with compat.log_level(ou.LOG_ERROR), TemporaryDirectory() as folder, InterruptGuard() as guard:
         compat.seed_ompl(options.seed)
-        session = BenchmarkSession(grid, endpoints, variants, options, guard)
+        session = BenchmarkSession(workspace, endpoints, variants, options, guard)
         benchmark = compat.new_benchmark(
             session.setup, name, guard.wrap(session.before_run), guard.wrap(session.after_run)
         )
@@ -218,22 +218,23 @@ class BenchmarkSession:
 
     def __init__(
         self,
-        grid: GridMap,
+        workspace: Workspace,
         endpoints: Endpoints,
         variants: Sequence[PlannerVariant],
         options: RunOptions,
         guard: InterruptGuard,
     ) -> None:
-        self.setup = make_setup(grid, endpoints, options.tolerance)
+        self.setup = make_setup(workspace, endpoints, options.tolerance)
         si = self.setup.getSpaceInformation()
-        self._motions = _Motions(si, grid)
-        self.setup.setStateValidityChecker(_States(si, grid, guard))
+        self._states = _States(si, self.setup.getStateValidityChecker(), guard)
+        self._motions = _Motions(si, si.getMotionValidator())
+        self.setup.setStateValidityChecker(self._states)
         si.setMotionValidator(self._motions)
         self.planners = {variant.name: self._planner(variant, options) for variant in variants}
         # Benchmark sets the setup up, which would make a planner of OMPL's choice without one.
         self.setup.setPlanner(next(iter(self.planners.values())))
         self.records: dict[str, list[RunRecord]] = {variant.name: [] for variant in variants}
-        self._grid, self._endpoints, self._options = grid, endpoints, options
+        self._workspace, self._endpoints, self._options = workspace, endpoints, options
         self._planner_of = {variant.name: variant.planner for variant in variants}
         self._sampler_of = {variant.name: variant.sampler for variant in variants}
         self._sources = {e.sampler: e.source for e in variants if e.source is not None}
@@ -255,9 +256,10 @@ class BenchmarkSession:
 
     def prepare_round(self) -> None:
         """Make the heat maps that the planners of a round share."""
+        positions = [endpoint[:2] for endpoint in self._endpoints]
         for sampler, source in self._sources.items():
             began = perf_counter()
-            heatmap = source(self._grid, *self._endpoints)
+            heatmap = source(self._workspace.grid, *positions)
             self._heatmaps[sampler] = heatmap, perf_counter() - began
 
     def before_run(self, planner: Any) -> None:
@@ -304,26 +306,28 @@ class BenchmarkSession:
     def _cost(self) -> float:
         if not self.setup.getProblemDefinition().hasExactSolution():
             return inf
-        path = checked_path(self.setup, self._grid, self._endpoints, self._options.tolerance)
-        return inf if path is None else path_length(path)
+        path = checked_path(self.setup, self._workspace, self._endpoints, self._options.tolerance)
+        return inf if path is None else path_cost(self.setup, self._workspace, path)
 
 
-class _States(GridValidityChecker):
+class _States(ob.StateValidityChecker):  # type: ignore[misc]
     """Call nothing valid any more once the guard has tripped, so that runs end at once."""
 
-    def __init__(self, si: Any, grid: GridMap, guard: InterruptGuard) -> None:
-        super().__init__(si, grid)
+    def __init__(self, si: Any, checker: Any, guard: InterruptGuard) -> None:
+        super().__init__(si)
+        self._is_valid = checker.isValid
         self._guard = guard
 
     def isValid(self, state: Any) -> bool:  # noqa: N802
-        return not self._guard.tripped and super().isValid(state)
+        return not self._guard.tripped and bool(self._is_valid(state))
 
 
-class _Motions(GridMotionValidator):
+class _Motions(ob.MotionValidator):  # type: ignore[misc]
     """Count the checks of a run, and now and then look at the best cost."""
 
-    def __init__(self, si: Any, grid: GridMap) -> None:
-        super().__init__(si, grid)
+    def __init__(self, si: Any, motions: Any) -> None:
+        super().__init__(si)
+        self._check = motions.checkMotion
         self.checks = 0
         self._history: CostHistory | None = None
 
@@ -341,4 +345,5 @@ class _Motions(GridMotionValidator):
         self.checks += 1
         if self._history is not None and self.checks % _LOOK_EVERY == 0:
             self._history.look()
-        return super().checkMotion(s1, s2, *last_valid)
+        valid: bool = self._check(s1, s2, *last_valid)
+        return valid

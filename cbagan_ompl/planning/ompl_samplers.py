@@ -12,14 +12,17 @@ from ..sampling.options import SamplerOptions
 from ..sampling.sampler import HeatmapSampler
 from . import compat
 from .compat import ob, typed_state
-from .states import position_bounds, space_of, state_access
+from .states import StateAccess, drives_backwards, position_bounds, space_of, state_access
 
 
 class HeatmapStateSampler(ob.StateSampler):  # type: ignore[misc]
-    """A state sampler whose positions come from a heat map; headings are uniform.
+    """A state sampler whose positions and headings come from a heat map.
+
+    Headings are uniform where the heat map knows none: :meth:`.Heatmap.directed` makes some.
 
     Args:
-        space: RealVectorStateSpace(2), SE2StateSpace, DubinsStateSpace or ReedsSheppStateSpace.
+        space: RealVectorStateSpace(2), SE2StateSpace, DubinsStateSpace, ReedsSheppStateSpace, or a
+            compound space whose first part is one of the last three.
         heatmap: what to sample; or a :class:`HeatmapSampler`, to share it with other samplers.
         options: how samples follow the heat map; ``sharpness`` None stands for 1.
         **changes: single fields of :class:`SamplerOptions`, such as ``seed=1``.
@@ -49,7 +52,7 @@ class HeatmapStateSampler(ob.StateSampler):  # type: ignore[misc]
         **changes: Any,
     ) -> None:
         self._sampler = _heatmap_sampler(heatmap, options, changes)
-        self._states = state_access(space, self._sampler.rng)
+        self._states = _writable(space, self._sampler)
         super().__init__(space)
         self._sampler.keep_inside(*position_bounds(space))
 
@@ -79,7 +82,9 @@ class HeatmapStateSampler(ob.StateSampler):  # type: ignore[misc]
 
 
 class HeatmapValidStateSampler(ob.ValidStateSampler):  # type: ignore[misc]
-    """A valid-state sampler whose positions come from a heat map; headings are uniform.
+    """A valid-state sampler whose positions and headings come from a heat map.
+
+    Headings are uniform where the heat map knows none: :meth:`.Heatmap.directed` makes some.
 
     Samples are checked with the space information's own validity checker, up to
     ``getNrAttempts()`` times (100 unless set), as OMPL's UniformValidStateSampler does.
@@ -120,7 +125,7 @@ class HeatmapValidStateSampler(ob.ValidStateSampler):  # type: ignore[misc]
         super().__init__(si)
         self._si = si
         self._sampler = _heatmap_sampler(heatmap, options, changes)
-        self._states = state_access(space, self._sampler.rng)
+        self._states = _writable(space, self._sampler)
         self._sampler.keep_inside(*position_bounds(space))
 
     @property
@@ -204,3 +209,7 @@ def _heatmap_sampler(
             "a HeatmapSampler has its own options: give them to it, or give a heat map here"
         )
     return heatmap
+
+
+def _writable(space: Any, sampler: HeatmapSampler) -> StateAccess:
+    return state_access(space, sampler.heading_sampler(drives_backwards(space)))

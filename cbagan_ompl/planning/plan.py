@@ -12,29 +12,45 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..common.validation import finite_number, positive_number, truth_value, whole_number
-from ..errors import ConfigError, MapError, show
-from ..maps.endpoints import Moves, snap_endpoints
+from ..common.validation import (
+    finite_number,
+    is_finite_number,
+    positive_number,
+    truth_value,
+    whole_number,
+)
+from ..errors import ConfigError, MapError, RobotError, show
+from ..maps.endpoints import Moves
 from ..maps.grid_map import GridMap
+from ..maps.grid_search import search_kind
+from ..robots.robot import Robot
 from ..sampling.heatmap import Heatmap
 from ..sampling.options import SamplerOptions
 from . import compat
 from .attach import Attachment, attach
 from .compat import ou
-from .heatmap_sources import LEARNED, UNIFORM, HeatmapSource, heatmap_source
+from .goals import heatmap_of_goals, reached_goal, set_goals, split_goals
+from .heatmap_sources import (
+    CORRIDOR,
+    LEARNED,
+    UNIFORM,
+    HeatmapSource,
+    heatmap_source,
+    is_auto,
+    resolve_auto,
+)
 from .hooks import check_planner, hangs_at_optimum
+from .paths import checked_path, follow_path, path_cost
 from .plan_result import PlanResult
 from .planner_names import planner_name
 from .problem import (
-    Endpoints,
-    checked_path,
-    follow_path,
     make_setup,
-    path_length,
     set_range,
     stop_at_optimum,
 )
 from .solving import Limits, SolveRecord, solve
+from .states import state_access
+from .workspace import Workspace
 
 if TYPE_CHECKING:
     from ..inference.predictor import Predictor
@@ -50,6 +66,7 @@ def plan(
     time: float = 1.0,
     iterations: int | None = None,
     range: float | None = None,
+    robot: Robot | None = None,
     radius: float = 0.0,
     snap: float = 0.0,
     model: Predictor | str | PathLike[str] | None = None,
@@ -64,22 +81,25 @@ def plan(
 
     Args:
         grid: the map, or a file for :meth:`GridMap.load`.
-        start: (x, y), world.
-        goal: (x, y), world.
+        start: (x, y), world; (x, y, yaw) for a robot with heading, radians.
+        goal: the same, or a list of several of which any will do: paths end in one of them, the
+            heat map has the largest of the values that those of each goal have.
         planner: a geometric planner by OMPL's name, such as ``"RRT"`` or ``"InformedRRTstar"``, or
             as the literature writes it, ``"RRT*"``, ``"RRT-Connect"``...
         sampler: one of :data:`cbagan_ompl.planning.heatmap_sources.SAMPLERS`; ``"uniform"`` leaves
-            OMPL's own sampler in place.
+            OMPL's own sampler in place. What ``"auto"`` chose is the ``sampler`` of the result.
         time: limit of the planner's solve, seconds. RRT-like planners stop at their first
             solution, RRT*-like ones go on to the limit.
         iterations: limit of the planner's iterations, whichever comes first.
         range: longest edge that the planner adds, world units; by default OMPL's choice (a
             fifth of the map's diagonal).
-        radius: of the robot, world units; obstacles are inflated by it.
+        robot: what moves, a point by default. Its shape and turning radius choose the state space
+            and the checks, see :class:`cbagan_ompl.Robot`.
+        radius: short for ``robot=Robot.disc(radius)``, world units.
         snap: how far a start or goal in an obstacle, in the margin around one, or in unknown space
             is moved at most, to the nearest place where the robot may be, world units.
-        model: for the learned sampler, a loaded model or the file of one; the bundled model by
-            default.
+        model: for the learned sampler (or auto), a loaded model or the file of one; the bundled
+            model by default.
         heatmap: to be sampled in place of the learned one: of this map, or an array (H, W) as
             :class:`Heatmap` takes it.
         simplify: let OMPL's path simplifier shorten the path afterwards.
@@ -96,7 +116,8 @@ def plan(
         The result; not finding a path in time is no error, ``solved`` is False then.
 
     Raises:
-        MapError: an unusable map or radius.
+        MapError: an unusable map or radius, or a map that the robot fits nowhere on.
+        RobotError: no robot, or a robot and a radius.
         TaskError: start or goal outside, in an obstacle, equal, or in separate parts.
         PlannerError: an unknown planner, or one that no hook reaches on this OMPL.
         ConfigError: an option that makes no sense.
@@ -111,23 +132,31 @@ def plan(
     if not isinstance(grid, GridMap | str | PathLike):
         raise MapError(f"grid is a GridMap or the file of a map, got {show(grid)}")
     source = grid if isinstance(grid, GridMap) else GridMap.load(grid)
-    space_map = source.inflated(radius)
+    workspace = Workspace(source, _robot_of(robot, radius))
+    goals = split_goals(goal)
     moves: Moves = {}
-    if snap != 0:
-        distance = finite_number("snap", snap, 0.0)
-        (start, goal), moves = snap_endpoints(space_map, start, goal, distance)
-    endpoints = space_map.check_task(start, goal)
-    tolerance = space_map.resolution
+    distance = finite_number("snap", snap, 0.0)
+    if distance > 0:
+        if len(goals) > 1:
+            raise ConfigError("snap moves one start and one goal: give one goal, or leave snap out")
+        (start, goals[0]), moves = workspace.snap(start, goals[0], distance)
+    tasks = [workspace.check_task(start, one) for one in goals]
+    tolerance = source.resolution
     if goal_tolerance is not None:
         tolerance = finite_number("goal_tolerance", goal_tolerance, 0.0)
     options, seed = _with_seed(SamplerOptions.of(options, changes))
     planner = planner_name(planner)
-    check_planner(planner, follows_heatmap=sampler != UNIFORM)
+    is_plain = isinstance(sampler, str) and sampler == UNIFORM
+    check_planner(planner, follows_heatmap=not is_plain)
+    if is_auto(sampler) and heatmap is None:
+        sampler = resolve_auto(source)
+        model = None if sampler == CORRIDOR else model
     name, make_heatmap = heatmap_source(sampler, model, heatmap)
     job = _Job(
         map_name=source.name,
-        grid=space_map,
-        endpoints=endpoints,
+        workspace=workspace,
+        start=tasks[0][0],
+        goals=[task[1] for task in tasks],
         moves=moves,
         tolerance=tolerance,
         planner=planner,
@@ -149,8 +178,9 @@ class _Job:
     """Everything that a plan needs, checked."""
 
     map_name: str
-    grid: GridMap
-    endpoints: Endpoints
+    workspace: Workspace
+    start: NDArray[np.float64]
+    goals: list[NDArray[np.float64]]
     moves: Moves
     tolerance: float
     planner: str
@@ -162,6 +192,21 @@ class _Job:
     seed: int
     simplify: bool
     keep_tree: bool
+
+
+def _robot_of(robot: Robot | None, radius: float) -> Robot:
+    """Return the robot that is meant by both options."""
+    if robot is not None and not isinstance(robot, Robot):
+        raise RobotError(
+            f"robot is a Robot, such as Robot.rectangle(length, width), got {show(robot)}"
+        )
+    if not is_finite_number(radius) or radius < 0:
+        raise MapError(f"the robot radius must be a length of at least 0, got {show(radius)}")
+    if radius == 0:
+        return robot or Robot.point()
+    if robot is not None:
+        raise RobotError("give robot or radius, which is short for robot=Robot.disc(radius)")
+    return Robot.disc(radius)
 
 
 def _with_seed(options: SamplerOptions) -> tuple[SamplerOptions, int]:
@@ -179,7 +224,9 @@ def _run(job: _Job) -> PlanResult:
     began = perf_counter()
     heatmap, attachment = None, None
     if job.make_heatmap is not None:
-        heatmap = job.make_heatmap(job.grid, *job.endpoints)
+        heatmap = heatmap_of_goals(
+            job.make_heatmap, job.workspace.grid, job.start[:2], [goal[:2] for goal in job.goals]
+        )
         attachment = attach(setup, heatmap, job.options)
     inference_s = perf_counter() - began if attachment else 0.0
     try:
@@ -192,18 +239,22 @@ def _run(job: _Job) -> PlanResult:
 
 
 def _set_up(job: _Job) -> Any:
-    setup = make_setup(job.grid, job.endpoints, job.tolerance)
+    nearest = min(job.goals, key=lambda goal: float(np.hypot(*(goal - job.start)[:2])))
+    setup = make_setup(job.workspace, (job.start, nearest), job.tolerance)
+    if len(job.goals) > 1:
+        set_goals(setup, job.workspace, job.goals, setup.getGoal().getThreshold())
     setup.setPlanner(compat.planner_class(job.planner)(setup.getSpaceInformation()))
     if job.range is not None and not set_range(setup.getPlanner(), job.range):
         raise ConfigError(f"{job.planner} has no range to set: leave it out")
     setup.setup()
     if hangs_at_optimum(job.planner):
-        stop_at_optimum(setup, job.endpoints, job.tolerance)
+        stop_at_optimum(setup, (job.start, nearest), job.tolerance)
     return setup
 
 
 def _tree_of(setup: Any) -> NDArray[np.float64]:
-    return compat.tree_edges(compat.planner_data(setup.getPlanner()))
+    read = state_access(setup.getStateSpace()).read
+    return compat.tree_edges(compat.planner_data(setup.getPlanner()), read)
 
 
 def _simplify(setup: Any) -> float:
@@ -221,27 +272,30 @@ def _result(
     inference_s: float,
     simplify_s: float,
 ) -> PlanResult:
-    checked = None
+    workspace, checked, goal = job.workspace, None, job.goals[0]
     if run.is_exact:
-        checked = checked_path(setup, job.grid, job.endpoints, job.tolerance)
+        goal = reached_goal(setup, workspace, job.goals)
+        checked = checked_path(setup, workspace, (job.start, goal), job.tolerance)
     is_solved = checked is not None
-    path = np.empty((0, 2)) if checked is None else checked
+    path = np.empty((0, len(job.start))) if checked is None else checked
     return PlanResult(
         solved=is_solved,
         status=run.status,
         planner=job.planner,
         sampler=job.sampler,
+        grid_search=search_kind() if job.sampler in (CORRIDOR, LEARNED) else None,
         hook=attachment.hook if attachment else None,
         ompl_version=compat.ompl_version(),
         seed=job.seed,
         map=job.map_name,
-        start=job.endpoints[0],
-        goal=job.endpoints[1],
+        robot=workspace.robot,
+        start=job.start,
+        goal=goal,
         snapped=job.moves,
         goal_tolerance=job.tolerance,
         path=path,
-        trajectory=follow_path(path, job.grid.resolution / 2),
-        cost=path_length(path) if is_solved else inf,
+        trajectory=follow_path(setup, workspace, path, workspace.source.resolution / 2),
+        cost=path_cost(setup, workspace, path) if is_solved else inf,
         inference_s=inference_s,
         planning_s=run.planning_s,
         simplify_s=simplify_s,
@@ -252,6 +306,7 @@ def _result(
         nodes=run.nodes,
         nodes_at_first_solution=run.nodes_at_first_solution if is_solved else None,
         sample_counts=attachment.sample_counts if attachment else {"learned": 0, "uniform": 0},
+        heatmap_kept=False,
         heatmap=heatmap,
         tree=_tree_of(setup) if job.keep_tree else None,
     )

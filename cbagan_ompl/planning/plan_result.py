@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields
 from math import isfinite
 from os import PathLike
 from typing import Any
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..common.files import write_atomically
 from ..maps.endpoints import Moves
+from ..robots.robot import Robot
 from ..sampling.heatmap import Heatmap
 from .path_files import path_csv
 
@@ -26,19 +27,25 @@ class PlanResult:
         planner: OMPL's name of the planner.
         sampler: ``"learned"``, ``"uniform"``, ``"corridor"``, ``"straight-line"`` or
             ``"heatmap"`` (the caller's own).
+        grid_search: ``"compiled"`` or ``"SciPy"``, what makes corridors, and connects the regions
+            of the learned sampler; None for other samplers.
         hook: by which hook the planner was reached; None for the uniform sampler.
         ompl_version: of the installed package.
         seed: what makes the samples of this run again.
         map: name of the map.
-        start: (x, y), world, as in :class:`cbagan_ompl.GridMap`; where the path begins.
-        goal: (x, y), world.
+        robot: what moves.
+        start: (x, y), world, as in :class:`cbagan_ompl.GridMap`; (x, y, yaw) for robots with
+            heading. Where the path begins.
+        goal: the same; where it ends. Of several goals the one that it reached, or the first.
         snapped: the endpoints that were moved, ``"start"`` or ``"goal"``, each with the point that
             was ``"given"`` and the ``"distance"`` from it, world units; see ``snap``.
         goal_tolerance: how far from the goal a path may end, world units.
-        path: way points from start to goal, (N, 2), world; empty when not solved.
-        trajectory: the path followed at steps of at most half a pixel, its way points included,
-            (M, 2), world; empty when not solved.
-        cost: length of the path; infinite when not solved.
+        path: way points from start to goal, (N, 2), or poses (N, 3) for robots with heading, world;
+            empty when not solved.
+        trajectory: the path followed in steps along which no point of the robot moves more than
+            half a pixel, way points included, (M, 2) or (M, 3), world; empty when not solved.
+        cost: length of the path, along the curves of robots with a turning radius; in SE(2) half of
+            each turn, in radians, counts as well, as OMPL has it. Infinite when not solved.
         inference_s: making the heat map and attaching it, loading the model not included.
         planning_s: inside the planner's ``solve``.
         simplify_s: inside OMPL's path simplifier.
@@ -54,6 +61,8 @@ class PlanResult:
             the planner does not let it be known.
         sample_counts: ``{"learned": n, "uniform": m}`` samples that the planner had from the heat
             map's hook; both 0 for the uniform sampler, which has no hook.
+        heatmap_kept: whether the heat map is that of an earlier plan of a
+            :class:`cbagan_ompl.Replanner`.
         heatmap: what was sampled; None for the uniform sampler. Not part of the JSON.
         tree: edges of the planner's tree, (M, 2, 2): two points (x, y) each, world; when asked for.
             Not part of the JSON.
@@ -71,10 +80,12 @@ class PlanResult:
     status: str
     planner: str
     sampler: str
+    grid_search: str | None
     hook: str | None
     ompl_version: str
     seed: int
     map: str
+    robot: Robot
     start: NDArray[np.float64]
     goal: NDArray[np.float64]
     snapped: Moves
@@ -92,6 +103,7 @@ class PlanResult:
     nodes: int
     nodes_at_first_solution: int | None
     sample_counts: dict[str, int]
+    heatmap_kept: bool
     heatmap: Heatmap | None = field(repr=False, metadata={"json": False})
     tree: NDArray[np.float64] | None = field(repr=False, metadata={"json": False})
 
@@ -122,4 +134,5 @@ class PlanResult:
             f.name: getattr(self, f.name) for f in fields(self) if f.metadata.get("json", True)
         }
         arrays = {k: v.tolist() for k, v in values.items() if isinstance(v, np.ndarray)}
-        return values | arrays | {"cost": self.cost if isfinite(self.cost) else None}
+        cost = self.cost if isfinite(self.cost) else None
+        return values | arrays | {"cost": cost, "robot": asdict(self.robot)}

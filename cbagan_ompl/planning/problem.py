@@ -1,20 +1,14 @@
-"""A task on a map as OMPL sees it, and the check of what OMPL gives back."""
+"""A task as OMPL sees it, and the parameters of planners."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import ConfigError, show
-from ..maps.grid_map import GridMap
-from . import compat
 from .compat import ob, og
-from .validity import GridMotionValidator, GridValidityChecker
-
-#: Start and goal, as from :meth:`GridMap.check_task`.
-Endpoints = tuple[NDArray[np.float64], NDArray[np.float64]]
+from .workspace import Endpoints, Workspace
 
 _LEAST_THRESHOLD = float(np.finfo(np.float64).eps)
 
@@ -26,26 +20,26 @@ _NO_PARAMETERS = frozenset(
 # How near to the shortest cost the search for a shorter path ends, relative.
 _OPTIMUM_SLACK = 1e-6
 
-# Slack of the check that a path ends in the goal region, for the rounding of a distance.
-_ROUNDING = 1e-9
+# Paths this short, as a fraction of the distance of start and goal, are not made shorter: they are
+# found where the start is in the goal region already, or nearly.
+_NEGLIGIBLE_FRACTION = 1e-2
 
 
-def make_setup(grid: GridMap, endpoints: Endpoints, tolerance: float) -> Any:
+def make_setup(workspace: Workspace, endpoints: Endpoints, tolerance: float) -> Any:
     """Return a SimpleSetup with exact checks, start and goal, but no planner.
 
     Args:
-        grid: the map.
-        endpoints: start and goal, as from :meth:`GridMap.check_task`.
+        workspace: the robot on its map.
+        endpoints: start and goal, as from :meth:`.workspace.Workspace.check_task`.
         tolerance: how far from the goal a path may end, world units.
     """
-    space = compat.plane_space(*grid.bounds)
+    space = workspace.make_space()
     setup = og.SimpleSetup(space)
     si = setup.getSpaceInformation()
-    setup.setStateValidityChecker(GridValidityChecker(si, grid))
-    si.setMotionValidator(GridMotionValidator(si, grid))
-    start, goal = compat.new_state(space), compat.new_state(space)
-    for state, point in ((start, endpoints[0]), (goal, endpoints[1])):
-        state[0], state[1] = float(point[0]), float(point[1])
+    checker, motions = workspace.make_checks(si)
+    setup.setStateValidityChecker(checker)
+    si.setMotionValidator(motions)
+    start, goal = (workspace.make_state(space, endpoint) for endpoint in endpoints)
     # A goal is reached at less than its threshold; OMPL's own default is the least one as well.
     setup.setStartAndGoalStates(start, goal, max(float(tolerance), _LEAST_THRESHOLD))
     return setup
@@ -71,15 +65,19 @@ def stop_at_optimum(setup: Any, endpoints: Endpoints, tolerance: float) -> None:
     """Let planners of a setup end once no path can be shorter, by a millionth.
 
     SORRT* needs it. It makes samples that may shorten its path until it has a batch of them, and
-    where the path is the straight line there are none: its solve would never return.
+    where the path is the straight line there are none: its solve would never return. Where the
+    start is nearly in the goal region there are few, and it would go on far beyond its time.
 
     Args:
         setup: whose planner has been set up, and has set the objective.
         endpoints: start and goal.
         tolerance: how far from the goal a path may end, world units.
     """
-    shortest = max(float(np.hypot(*(endpoints[1] - endpoints[0]))) - tolerance, 0.0)
-    _set_cost_threshold(setup, shortest * (1 + _OPTIMUM_SLACK))
+    distance = float(np.hypot(*(endpoints[1] - endpoints[0])[:2]))
+    shortest = max(distance - tolerance, 0.0)
+    _set_cost_threshold(
+        setup, max(shortest * (1 + _OPTIMUM_SLACK), distance * _NEGLIGIBLE_FRACTION)
+    )
 
 
 def search_to_the_end(setup: Any) -> None:
@@ -123,40 +121,3 @@ def set_parameter(planner: Any, name: str, value: bool | float | str) -> None:
         raise ConfigError(
             f"{kind}.{setters[wanted]} does not take {show(value)} ({type(value).__name__})"
         ) from error
-
-
-def checked_path(
-    setup: Any, grid: GridMap, endpoints: Endpoints, tolerance: float
-) -> NDArray[np.float64] | None:
-    """Return the path that a setup has, (N, 2); None when it is no path of the task after all."""
-    path = compat.path_positions(setup.getSolutionPath())
-    at_start = np.array_equal(path[0], endpoints[0])
-    at_goal = np.hypot(*(path[-1] - endpoints[1])) <= tolerance + _ROUNDING
-    return path if at_start and at_goal and grid.path_is_free(path) else None
-
-
-def path_length(path: NDArray[np.float64]) -> float:
-    """Return the length of a path, (N, 2), world units."""
-    return float(np.hypot(*np.diff(path, axis=0).T).sum())
-
-
-def follow_path(path: NDArray[np.float64], step: float) -> NDArray[np.float64]:
-    """Return points along a path, the way points among them.
-
-    Args:
-        path: way points, (N, 2), world.
-        step: the longest distance between two points, world units.
-
-    Returns:
-        (M, 2), world; each segment is divided into equal steps.
-
-    Example:
-        >>> follow_path(np.array([[0.0, 0.0], [0.0, 1.0]]), 0.5).tolist()
-        [[0.0, 0.0], [0.0, 0.5], [0.0, 1.0]]
-    """
-    counts = np.ceil(np.hypot(*np.diff(path, axis=0).T) / step).astype(int).clip(1)
-    pieces = [
-        np.linspace(start, end, count, endpoint=False)
-        for start, end, count in zip(path[:-1], path[1:], counts.tolist(), strict=True)
-    ]
-    return np.vstack((*pieces, path[-1:]))

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from math import pi
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import PlannerError, show
+from ..sampling.headings import HeadingSampler
 from .compat import ob
 
 
@@ -47,11 +47,11 @@ class PoseStateAccess:
     """Access to states of SE2StateSpace, DubinsStateSpace and ReedsSheppStateSpace.
 
     Args:
-        seed: seed or generator of the headings, which are uniform.
+        headings: samples the heading at a position; None for reading alone.
     """
 
-    def __init__(self, seed: int | np.random.Generator | None = None) -> None:
-        self._rng = np.random.default_rng(seed)
+    def __init__(self, headings: HeadingSampler | None) -> None:
+        self._headings = headings
 
     @staticmethod
     def read(state: Any) -> tuple[float, float]:
@@ -60,17 +60,47 @@ class PoseStateAccess:
 
     def write(self, state: Any, x: float, y: float) -> None:
         """Set (x, y) and sample a heading; arguments as for :meth:`StateAccess.write`."""
+        assert self._headings is not None, "this access is for reading"
         state.setX(x)
         state.setY(y)
-        state.setYaw(float(self._rng.uniform(-pi, pi)))
+        state.setYaw(self._headings.sample(x, y))
 
 
-def state_access(space: Any, seed: int | np.random.Generator | None = None) -> StateAccess:
+class CompoundStateAccess:
+    """Access to states of a CompoundStateSpace whose first part has poses.
+
+    The other parts of a sample come from their own samplers, uniform.
+
+    Args:
+        space: the space.
+        headings: as for :class:`PoseStateAccess`.
+    """
+
+    def __init__(self, space: Any, headings: HeadingSampler | None) -> None:
+        self._pose = PoseStateAccess(headings)
+        self._space = space  # keeps the parts alive, which their samplers refer to
+        self._others = [
+            (part, space.getSubspace(part).allocDefaultStateSampler())
+            for part in range(1, space.getSubspaceCount())
+        ]
+
+    def read(self, state: Any) -> tuple[float, float]:
+        """Return the (x, y) of a state."""
+        return self._pose.read(state[0])
+
+    def write(self, state: Any, x: float, y: float) -> None:
+        """Set (x, y), sample everything else; arguments as for :meth:`StateAccess.write`."""
+        self._pose.write(state[0], x, y)
+        for part, sampler in self._others:
+            sampler.sampleUniform(state[part])
+
+
+def state_access(space: Any, headings: HeadingSampler | None = None) -> StateAccess:
     """Return the access that fits a state space.
 
     Args:
         space: an OMPL state space.
-        seed: seed or generator for the parts of a state that the heat map says nothing about.
+        headings: samples the headings of poses; None for reading alone.
 
     Raises:
         PlannerError: no state space, or one whose states have no (x, y).
@@ -78,13 +108,63 @@ def state_access(space: Any, seed: int | np.random.Generator | None = None) -> S
     if not isinstance(space, ob.StateSpace):
         raise PlannerError(f"expected a state space of ompl.base, got {show(space)}")
     if isinstance(space, ob.SE2StateSpace):
-        return PoseStateAccess(seed)
+        return PoseStateAccess(headings)
+    if pose_space(space) is not None:
+        return CompoundStateAccess(space, headings)
     if isinstance(space, ob.RealVectorStateSpace) and space.getDimension() == 2:
         return PlaneStateAccess()
     raise PlannerError(
-        "a 2-D heat map serves RealVectorStateSpace(2), SE2StateSpace, DubinsStateSpace and "
-        f"ReedsSheppStateSpace, not {type(space).__name__} of dimension {space.getDimension()}"
+        "a 2-D heat map serves RealVectorStateSpace(2), SE2StateSpace, DubinsStateSpace, "
+        "ReedsSheppStateSpace and compound spaces whose first part is one of the last three, not "
+        f"{type(space).__name__} of dimension {space.getDimension()}"
     )
+
+
+def read_pose(state: Any) -> tuple[float, float, float]:
+    """Return the (x, y, yaw) of a state of an SE2StateSpace."""
+    return state.getX(), state.getY(), state.getYaw()
+
+
+def pose_space(space: Any) -> Any:
+    """Return the SE2StateSpace that a space is or holds as its first part; None without one.
+
+    Args:
+        space: an OMPL state space.
+    """
+    if isinstance(space, ob.SE2StateSpace):
+        return space
+    if isinstance(space, ob.CompoundStateSpace) and space.getSubspaceCount():
+        first = space.getSubspace(0)
+        return first if isinstance(first, ob.SE2StateSpace) else None
+    return None
+
+
+def is_distance_bound(space: Any) -> bool:
+    """Return whether no distance in a space is below the Euclidean one of the positions.
+
+    It is so in the plane and along Dubins and Reeds-Shepp curves. In other spaces of poses OMPL
+    adds the distances of the parts of a state, each times a weight: positions weigh 1 unless the
+    user has set another one.
+
+    Args:
+        space: one that :func:`state_access` serves.
+    """
+    poses = pose_space(space)
+    if poses is None:
+        return True
+    weight = 1.0 if poses is space else space.getSubspaceWeight(0)
+    if not isinstance(poses, ob.DubinsStateSpace | ob.ReedsSheppStateSpace):
+        weight *= poses.getSubspaceWeight(0)
+    return bool(weight >= 1)
+
+
+def drives_backwards(space: Any) -> bool:
+    """Return whether motions in a space go backwards as well as forwards.
+
+    Args:
+        space: an OMPL state space.
+    """
+    return isinstance(pose_space(space), ob.ReedsSheppStateSpace)
 
 
 def space_of(si: Any) -> Any:
@@ -104,5 +184,6 @@ def position_bounds(space: Any) -> tuple[NDArray[np.float64], NDArray[np.float64
     Args:
         space: one that :func:`state_access` serves.
     """
-    bounds = space.getBounds()
+    poses = pose_space(space)
+    bounds = (space if poses is None else poses).getBounds()
     return np.array(list(bounds.low)[:2]), np.array(list(bounds.high)[:2])

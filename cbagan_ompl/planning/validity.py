@@ -5,9 +5,12 @@ from __future__ import annotations
 from math import floor
 from typing import Any
 
-from ..errors import MapError, PlannerError, show
+from ..errors import PlannerError
+from ..maps.checks import check_grid
 from ..maps.collision import segment_is_free
 from ..maps.grid_map import GridMap
+from ..robots.robot import Robot
+from ..robots.shape_checker import ShapeChecker
 from .compat import ob
 from .states import StateAccess, space_of, state_access
 
@@ -35,11 +38,14 @@ class GridValidityChecker(ob.StateValidityChecker):  # type: ignore[misc]
     """
 
     def __init__(self, si: Any, grid: GridMap) -> None:
-        _check_grid(grid)
+        check_grid(grid)
         self._read = state_access(space_of(si)).read
         super().__init__(si)
         self._cells, self._width, self._height = grid.cells, grid.width, grid.height
         self._affine = tuple(grid.pixel_from_world)
+        self._grid = grid
+        # Made when first asked for the clearance.
+        self._checker: ShapeChecker | None = None
 
     def isValid(self, state: Any) -> bool:  # noqa: N802
         """Return whether a state is valid: a real ``bool``, as OMPL 2.0 demands."""
@@ -50,6 +56,15 @@ class GridValidityChecker(ob.StateValidityChecker):  # type: ignore[misc]
         if not (0 <= u < self._width and 0 <= v < self._height):
             return False
         return self._cells[floor(v) * self._width + floor(u)] == 1
+
+    def clearance(self, state: Any) -> float:
+        """Return the distance from a state to the nearest blocked pixel, world units.
+
+        It is 0 in an invalid state, and infinite on a map without obstacles, whose border is none.
+        """
+        if self._checker is None:
+            self._checker = ShapeChecker.of(self._grid, Robot.point())
+        return self._checker.clearance(*self._read(state), 0.0)
 
 
 class GridMotionValidator(ob.MotionValidator):  # type: ignore[misc]
@@ -80,7 +95,7 @@ class GridMotionValidator(ob.MotionValidator):  # type: ignore[misc]
     """
 
     def __init__(self, si: Any, grid: GridMap) -> None:
-        _check_grid(grid)
+        check_grid(grid)
         self._space = space_of(si)
         self._read = _straight_state_access(self._space).read
         super().__init__(si)
@@ -121,11 +136,6 @@ class GridMotionValidator(ob.MotionValidator):  # type: ignore[misc]
         last_valid.second = low
         if last_valid.first is not None:
             self._space.interpolate(s1, s2, low, last_valid.first)
-
-
-def _check_grid(grid: object) -> None:
-    if not isinstance(grid, GridMap):
-        raise MapError(f"expected a GridMap, got {show(grid)}; load one with GridMap.load(path)")
 
 
 def _straight_state_access(space: Any) -> StateAccess:

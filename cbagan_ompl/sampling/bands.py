@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import ceil, log2, sqrt
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +11,10 @@ from numpy.typing import NDArray
 from ..maps.grid_map import GridMap
 
 _MIN_HALF_WIDTH = 2.0
+
+# Values below this one are 0, which is so from _REACH half widths on.
+_LEAST = 0.01
+_REACH = sqrt(-log2(_LEAST))
 
 
 def half_width(grid: GridMap, fraction: float) -> float:
@@ -20,9 +26,16 @@ def paint_band(
     shape: tuple[int, int], path: NDArray[np.float64], half_width: float
 ) -> NDArray[np.float32]:
     """Paint a polyline of pixel points (M, 2): 1 on it, 0.5 at ``half_width`` pixels from it."""
-    off_path = np.ones(shape, np.uint8)
-    corners = np.floor(path).astype(np.int32).reshape(-1, 1, 2)
-    cv2.polylines(off_path, [corners], isClosed=False, color=0)
+    corners = np.floor(path).astype(np.int32)
+    # Farther away the band is 0: most of a large map need not be looked at.
+    reach = ceil(half_width * _REACH) + 1
+    left, top = np.maximum(corners.min(axis=0) - reach, 0)
+    right, bottom = corners.max(axis=0) + reach + 1
+    band = np.zeros(shape, np.float32)
+    near = band[top:bottom, left:right]
+    off_path = np.ones(near.shape, np.uint8)
+    cv2.polylines(off_path, [(corners - (left, top)).reshape(-1, 1, 2)], isClosed=False, color=0)
     distance = cv2.distanceTransform(off_path, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    band: NDArray[np.float32] = np.exp2(-((distance / np.float32(half_width)) ** 2))
-    return np.where(band < 0.01, np.float32(0), band)
+    np.exp2(-((distance / np.float32(half_width)) ** 2), out=near)
+    near[near < _LEAST] = 0
+    return band

@@ -1,4 +1,4 @@
-"""Files of heat maps: grey images and NumPy arrays, checked before they are decoded."""
+"""Files of heat maps: images and NumPy arrays, checked before they are decoded."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from numpy.lib import format as npy_format
 from numpy.typing import NDArray
 
 from ..common.files import open_regular, read_bytes, reason
-from ..errors import CbaganOmplError, HeatmapError, show
-from ..maps.image_files import decode_image
+from ..errors import HeatmapError, show
+from ..maps.image_files import decode_pixels
+from .colour_pictures import has_colours, read_green_region
 
 # Bytes in which a header of a NumPy file must fit: that of a 2-D array of numbers takes 128.
 _LONGEST_HEADER = 4096
@@ -37,11 +38,11 @@ def read_heatmap_values(path: Path, shape: tuple[int, int]) -> NDArray[Any]:
         return _read_array(path, shape)
     height, width = shape
     data = read_bytes(path, HeatmapError, _MOST_BYTES_PER_PIXEL * height * width + _OVERHEAD)
-    try:
-        gray, white, _ = decode_image(data, str(path))
-    except CbaganOmplError as error:
-        raise HeatmapError(f"cannot read the heat map {error}") from error
-    _check_shape(path, gray.shape, shape)
+    name = f"cannot read the heat map {path}"
+    pixels, white = decode_pixels(data, name, HeatmapError, (width, height))
+    if has_colours(pixels):
+        return read_green_region(pixels, white, str(path))
+    gray = pixels if pixels.ndim == 2 else pixels[..., 0]
     if white in (255, 65535):  # the full range of a type of its own
         return gray.astype(np.uint8) if white == 255 else gray
     return gray / np.float32(white)

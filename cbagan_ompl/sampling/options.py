@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
+from math import pi
 from typing import Any
 
 import numpy as np
 
-from ..common.validation import check_seed, is_finite_number, random_generator, truth_value
+from ..common.validation import check_seed, random_generator, to_float, truth_value
 from ..errors import ConfigError, show
 
 #: Least uniform fraction: with less, no run would ever see a uniform sample.
@@ -57,12 +58,15 @@ class Adaptation:
         Raises:
             ConfigError: an unknown name, or one text in place of several names.
         """
-        if isinstance(names, str) or not isinstance(names, Iterable):
+        try:
+            chosen = None if isinstance(names, str) else list(names)
+        except Exception:  # whatever the class of the value raises
+            chosen = None
+        if chosen is None:
             raise ConfigError(
                 f"the rules of an adaptation are a list of names, such as ['coverage'], got "
                 f"{show(names)}"
             )
-        chosen = list(names)
         unknown = [n for n in chosen if not (isinstance(n, str) and n in ADAPTATION_RULES)]
         if unknown:
             raise ConfigError(
@@ -86,6 +90,53 @@ NO_ADAPTATION = Adaptation.of(())
 
 
 @dataclass(frozen=True)
+class HeadingSpread:
+    """How the headings of samples spread around the heading of the heat map.
+
+    Attributes:
+        spread: standard deviation of the heading, radians, above 0 and at most pi.
+        uniform_fraction: fraction of the samples whose heading is uniform, from
+            :data:`LEAST_UNIFORM_FRACTION` to 1. It is never 0, so that the planner stays
+            probabilistically complete; with 1 the headings of the heat map are not used at all.
+        reverse_fraction: fraction of the other samples whose heading is turned by pi, from 0 to 1,
+            for robots that drive backwards as well (ReedsSheppStateSpace).
+
+    Raises:
+        ConfigError: a value of the wrong type or out of range; the message names the option.
+
+    Example:
+        >>> HeadingSpread(spread=0.2).uniform_fraction
+        0.2
+    """
+
+    spread: float = 0.4
+    uniform_fraction: float = 0.2
+    reverse_fraction: float = 0.2
+
+    def __post_init__(self) -> None:
+        given = self.spread, self.uniform_fraction, self.reverse_fraction
+        spread, uniform, reverse = map(to_float, given)
+        if not 0 < spread <= pi:
+            raise ConfigError(
+                "the spread of headings is a number of radians above 0, at most pi, got "
+                f"{show(self.spread)}"
+            )
+        if not LEAST_UNIFORM_FRACTION <= uniform <= 1:
+            raise ConfigError(
+                "the uniform_fraction of headings is a fraction from "
+                f"{LEAST_UNIFORM_FRACTION:g} to 1, got {show(self.uniform_fraction)}; it cannot be "
+                "0, because the planner would lose probabilistic completeness"
+            )
+        if not 0 <= reverse <= 1:
+            raise ConfigError(
+                f"the reverse_fraction of headings is a fraction from 0 to 1, got "
+                f"{show(self.reverse_fraction)}"
+            )
+        for field, value in zip(fields(self), (spread, uniform, reverse), strict=True):
+            object.__setattr__(self, field.name, value)
+
+
+@dataclass(frozen=True)
 class SamplerOptions:
     """How samples follow a heat map.
 
@@ -98,6 +149,7 @@ class SamplerOptions:
             the planner decides, see :func:`cbagan_ompl.attach`.
         adaptation: how the mixture follows the planner's tree, see :class:`Adaptation`.
         seed: an int of at least 0, or a generator; the same seed gives the same samples.
+        heading: how the headings of poses follow those of the heat map, see :class:`HeadingSpread`.
 
     Raises:
         ConfigError: a value of the wrong type or out of range; the message names the option.
@@ -111,20 +163,20 @@ class SamplerOptions:
     sharpness: float | None = None
     adaptation: Adaptation = FULL_ADAPTATION
     seed: int | np.random.Generator | None = None
+    heading: HeadingSpread = HeadingSpread()
 
     def __post_init__(self) -> None:
-        fraction, sharpness = self.uniform_fraction, self.sharpness
-        if not (is_finite_number(fraction) and LEAST_UNIFORM_FRACTION <= fraction <= 1):
+        fraction = to_float(self.uniform_fraction)
+        if not LEAST_UNIFORM_FRACTION <= fraction <= 1:
             raise ConfigError(
                 f"uniform_fraction is a fraction from {LEAST_UNIFORM_FRACTION:g} to 1, got "
-                f"{show(fraction)}; it cannot be 0, because the planner would lose probabilistic "
-                "completeness"
+                f"{show(self.uniform_fraction)}; it cannot be 0, because the planner would lose "
+                "probabilistic completeness"
             )
-        if sharpness is not None and not (
-            is_finite_number(sharpness) and 0 < sharpness <= LARGEST_SHARPNESS
-        ):
+        sharpness = None if self.sharpness is None else to_float(self.sharpness)
+        if sharpness is not None and not 0 < sharpness <= LARGEST_SHARPNESS:
             raise ConfigError(
-                f"sharpness is a finite number above 0, got {show(sharpness)}; at most "
+                f"sharpness is a finite number above 0, got {show(self.sharpness)}; at most "
                 f"{LARGEST_SHARPNESS:g}, or None where the planner is to decide"
             )
         if not isinstance(self.adaptation, Adaptation):
@@ -132,9 +184,15 @@ class SamplerOptions:
                 f"adaptation is an Adaptation, got {show(self.adaptation)}; write "
                 "Adaptation.of([]) for none, Adaptation.of(['coverage']) for single rules"
             )
+        if not isinstance(self.heading, HeadingSpread):
+            raise ConfigError(
+                f"heading is a HeadingSpread, got {show(self.heading)}; write "
+                "HeadingSpread(spread=0.4) for one, HeadingSpread(uniform_fraction=1) for uniform "
+                "headings"
+            )
         # Any kind of real number is a float from here on, and any whole number an int.
-        object.__setattr__(self, "uniform_fraction", float(fraction))
-        object.__setattr__(self, "sharpness", None if sharpness is None else float(sharpness))
+        object.__setattr__(self, "uniform_fraction", fraction)
+        object.__setattr__(self, "sharpness", sharpness)
         object.__setattr__(self, "seed", check_seed(self.seed))
 
     @classmethod

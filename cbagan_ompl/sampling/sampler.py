@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from .adaptation import AdaptiveMixture
 from .budget import LearnedBudget
-from .heatmap import Heatmap, check_heatmap
+from .checks import check_heatmap
+from .headings import HeadingSampler
+from .heatmap import Heatmap
 from .monitor import Monitor, NoMonitor
 from .options import SamplerOptions
 from .pixel_sampler import PixelSampler
@@ -71,6 +73,7 @@ class HeatmapSampler:
         self.chance = Random(int(self.rng.integers(2**63))).random
         self._uniform_fraction = float(options.uniform_fraction)
         self._exponent = np.float32(1.0 if options.sharpness is None else options.sharpness)
+        self._spread = options.heading
         self.monitor = monitor or NoMonitor()
         self._mixture = mixture
         self._budget = budget
@@ -87,6 +90,14 @@ class HeatmapSampler:
     def sample_counts(self) -> dict[str, int]:
         """Samples handed out so far: ``{"learned": n, "uniform": m}``."""
         return {"learned": self._learned_count, "uniform": self._uniform_count}
+
+    def heading_sampler(self, reverses: bool) -> HeadingSampler:
+        """Return what samples the headings of poses, from the same generator.
+
+        Args:
+            reverses: whether the robot drives backwards as well.
+        """
+        return HeadingSampler(self.heatmap, self._spread, self.rng, reverses)
 
     def keep_inside(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> None:
         """Sample only inside a box, such as the bounds of a state space.

@@ -47,7 +47,7 @@ def check_trainable(size: int, config: TrainingConfig) -> None:
         )
     # The smallest multiple of the stride whose smallest scale has enough patches.
     smallest = stride * -(-MIN_PATCHES * network.patch * max(scales) // stride)
-    if size < smallest:
+    if size < smallest and config.adversarial_weight:
         raise DatasetError(
             f"the discriminators take images of at least {smallest} pixels; these have {size}"
         )

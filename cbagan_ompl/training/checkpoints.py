@@ -10,27 +10,22 @@ from typing import Any
 
 import torch
 
-from ..common.files import as_path, read_bytes, write_atomically
+from ..common.files import as_path, write_atomically
 from ..errors import ModelError, show
-from ..inference.archives import Archive
 from ..inference.model_files import translate_damage
-from ..inference.tensor_pickles import check_group
-from ..networks.config import MAX_IMAGE_SIZE, MAX_WEIGHTS
+from ..networks.config import MAX_IMAGE_SIZE
 from ..networks.factory import check_weights, make_generator
 from ..networks.generator import Generator
 from ..networks.patch_generator import PatchGenerator
+from .checkpoint_files import read_checkpoint
 from .config import TrainingConfig
 
 #: Version of the form of a checkpoint; it goes up when the name of an option or a weight changes.
 SCHEMA = 4
-LAST, BEST = "last.pt", "best.pt"
-
-#: Largest checkpoint: six numbers for each weight (the weight, its average in the generator, two
-#: moments of the optimiser), and as much again for the log.
-MAX_CHECKPOINT_BYTES = 8 * 4 * MAX_WEIGHTS
 
 _SCORES = dict.fromkeys(("iou", "dice", "precision", "recall", "connectivity"), float)
-_NETWORKS = ("generator", "map_discriminator", "point_discriminator", "average")
+_GENERATORS = ("generator", "average")
+_DISCRIMINATORS = ("map_discriminator", "point_discriminator")
 _SYNTHETIC = {
     "seed": int,
     "hard_fraction": float,
@@ -49,7 +44,7 @@ _FORM: dict[str, Any] = {
         "train_tasks": int,
         "test_tasks": int,
     },
-    "gan": {name: {} for name in (*_NETWORKS, "optimizers")},
+    "gan": {name: {} for name in (*_GENERATORS, "optimizers")},
     "rng": str,
     "noise_rng": torch.Tensor,
     "history": [{"epoch": int, "losses": {}, "validation": _SCORES}],
@@ -77,17 +72,9 @@ def load_checkpoint(path: str | PathLike[str]) -> dict[str, Any]:
         ModelError: the file is missing, no training checkpoint, damaged, or of another version.
     """
     source = as_path(path, ModelError)
-    if not source.exists():
-        raise ModelError(f"{source}: no such file; `cbagan-ompl train` writes {LAST} and {BEST}")
-    data = read_bytes(source, ModelError, MAX_CHECKPOINT_BYTES)
+    data = read_checkpoint(source)
     with translate_damage(source, "not a training checkpoint, or a damaged one"):
-        archive = Archive(data)
-        is_model = "constants.pkl" in archive.sizes
-        if not is_model:
-            check_group(archive, "data")
-            state: Any = torch.load(io.BytesIO(data), map_location="cpu", weights_only=True)
-    if is_model:
-        raise ModelError(f"{source}: an exported model, not a training checkpoint")
+        state: Any = torch.load(io.BytesIO(data), map_location="cpu", weights_only=True)
     schema = state.get("schema") if isinstance(state, dict) else None
     if type(schema) is not int:
         raise ModelError(f"{source}: not a training checkpoint of cbagan-ompl")
@@ -128,7 +115,10 @@ def best_generator(
 
 
 def _check_form(state: dict[str, Any], path: Path) -> None:
-    form = dict(_FORM)
+    form, networks = dict(_FORM), [*_GENERATORS]
+    if isinstance(state.get("config"), dict) and state["config"].get("adversarial_weight", 1):
+        networks += _DISCRIMINATORS
+        form["gan"] = form["gan"] | {name: {} for name in _DISCRIMINATORS}
     if state.get("test") is not None:
         form |= {"test": _SCORES, "trivial": {}}
     wrong = _find_mismatch(state, form)
@@ -138,7 +128,7 @@ def _check_form(state: dict[str, Any], path: Path) -> None:
         wrong = _find_mismatch(state["trivial"], dict.fromkeys(state["trivial"], _SCORES))
     if wrong is not None:
         raise ModelError(f"{path}: damaged, its entry {wrong} is missing or of another kind")
-    for name in _NETWORKS:
+    for name in networks:
         for key, weights in state["gan"][name].items():
             if not isinstance(weights, torch.Tensor) or not torch.isfinite(weights).all():
                 raise ModelError(f"{path}: damaged, the weights {show(key)} are not finite numbers")

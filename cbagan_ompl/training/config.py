@@ -29,6 +29,9 @@ from ..networks.config import (
 SCHEDULES = ("one-cycle", "exponential")
 PRECISIONS = ("float32", "bfloat16")
 
+#: The checkpoints of a run: of its last epoch, and of its best one.
+LAST, BEST = "last.pt", "best.pt"
+
 #: Most epochs of a run.
 MAX_EPOCHS = 10_000
 
@@ -60,7 +63,8 @@ class TrainingConfig:
         plateau_factor: factor on the learning rates each time.
         adversarial_every: train the discriminators, and the generator against them, in every
             n-th step; the other steps train the generator on the supervised losses alone.
-        adversarial_weight: factor of each adversarial loss (alpha_1 = alpha_2 of the paper).
+        adversarial_weight: factor of each adversarial loss (alpha_1 = alpha_2 of the paper); with
+            0 there are no discriminators, and the generator is trained for segmentation alone.
         adaptive_alpha: alpha of the paper's adaptive generator loss, in which the discriminator
             that errs more weighs more; 0 gives both the same weight.
         pixel_weight: factor of the pixel-wise squared error.
@@ -256,16 +260,20 @@ RULES = {
     "seed": Rule(lambda value: 0 <= value < 2**63, "at least 0 and below 2**63"),
 }
 
+# The architecture of the bundled model.
+_BUNDLED = NetworkConfig(widths=(32, 48, 64), patch=4, cost_maps=2, white_obstacles=True)
+
 #: ``synthetic`` is what the bundled model was trained with: for images of 256 pixels, with new maps
-#: in every epoch. ``best`` is the best one for the paper's data. ``paper`` has the values of the
-#: tables of the CBAGAN-RRT paper. Where these and its text differ (50 epochs, momentum 0.9), the
-#: tables are followed; ``alpha_1 = alpha_2 = 0.5`` is the text's, the table's 1 being for another
-#: loss, as are its factors of an IoU loss and of a plain generator loss. The numbers that it leaves
-#: out (decay, plateau) are PyTorch's defaults or this project's.
+#: in every epoch. ``refine`` goes on from it on a data set, for segmentation alone, on maps that
+#: are met again as they are (no symmetries). ``best`` is the best one for the paper's data.
+#: ``paper`` has the values of the tables of the CBAGAN-RRT paper. Where these and its text differ
+#: (50 epochs, momentum 0.9), the tables are followed; ``alpha_1 = alpha_2 = 0.5`` is the text's,
+#: the table's 1 being for another loss, as are its factors of an IoU loss and of a plain generator
+#: loss. The numbers that it leaves out (decay, plateau) are PyTorch's defaults or this project's.
 PRESETS: dict[str, TrainingConfig] = {
     "best": TrainingConfig(),
     "synthetic": TrainingConfig(
-        network=NetworkConfig(widths=(32, 48, 64), patch=4, cost_maps=2, white_obstacles=True),
+        network=_BUNDLED,
         epochs=40,
         batch_size=16,
         warmup=0.05,
@@ -276,6 +284,20 @@ PRESETS: dict[str, TrainingConfig] = {
         positive_weight=3.5,
         scales=(1, 1, 1, 2),
         precision="bfloat16",
+    ),
+    "refine": TrainingConfig(
+        network=_BUNDLED,
+        epochs=60,
+        batch_size=8,
+        generator_lr=1e-3,
+        clip_norm=2.0,
+        adversarial_weight=0.0,
+        pixel_weight=4.0,
+        dice_weight=2.0,
+        positive_weight=3.5,
+        symmetries=False,
+        ema_decay=0.95,
+        validation_fraction=0.1,
     ),
     "paper": TrainingConfig(
         epochs=20,

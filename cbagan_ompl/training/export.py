@@ -17,14 +17,12 @@ from torch import nn
 from ..common.files import as_path, make_folder, read_bytes, read_text, write_atomically
 from ..common.outputs import check_output
 from ..errors import ModelError, show
-from ..inference.archives import Archive
 from ..inference.model_files import (
     MANIFEST,
-    MAX_MODEL_BYTES,
     MAX_NAME_LENGTH,
-    RECORD_MEMBER,
     RECORD_NAME,
     RECORD_SCHEMA,
+    is_model,
     read_manifest,
 )
 from ..networks.export_model import RegionModel
@@ -96,7 +94,7 @@ def export(
 def _check_outputs(model: Path, checkpoint: Path, force: bool) -> None:
     """Raise if a file would be overwritten that is an input, or that no export wrote."""
     for path, is_ours in (
-        (model, _is_model),
+        (model, is_model),
         (model.with_suffix(".md"), _is_card),
         (model.parent / MANIFEST, _is_manifest),
     ):
@@ -106,14 +104,6 @@ def _check_outputs(model: Path, checkpoint: Path, force: bool) -> None:
                 f"{path} exists, and `cbagan-ompl export` did not write it; choose another "
                 "--output, or overwrite it with --force"
             )
-
-
-def _is_model(path: Path) -> bool:
-    try:
-        # A damaged model may be replaced; what has no record is no model.
-        return RECORD_MEMBER in Archive(read_bytes(path, ModelError, MAX_MODEL_BYTES)).sizes
-    except Exception:  # zipfile lets many types through
-        return False
 
 
 def _is_card(path: Path) -> bool:
@@ -131,11 +121,16 @@ def _is_manifest(path: Path) -> bool:
 
 
 def save_script(model: nn.Module, path: Path, record: dict[str, Any]) -> None:
-    """Compile, freeze and save a module in evaluation mode, with its record inside.
+    """Write what :func:`script_bytes` returns.
 
     Raises:
         ModelError: the file cannot be written.
     """
+    write_atomically(path, script_bytes(model, record), ModelError)
+
+
+def script_bytes(model: nn.Module, record: dict[str, Any]) -> bytes:
+    """Compile and freeze a module in evaluation mode; return its file, with the record inside."""
     with warnings.catch_warnings():
         # TorchScript is deprecated in favour of torch.export, but it is the form that this
         # package's models have, and torch goes on reading and writing it.
@@ -145,7 +140,7 @@ def save_script(model: nn.Module, path: Path, record: dict[str, Any]) -> None:
         extra = {RECORD_NAME: json.dumps(record, indent=1)}
         buffer = io.BytesIO()
         torch.jit.save(frozen, buffer, _extra_files=extra)
-    write_atomically(path, buffer.getvalue(), ModelError)
+    return buffer.getvalue()
 
 
 def make_record(
@@ -199,8 +194,9 @@ def model_card(record: dict[str, Any]) -> str:
     return f"""# {record["name"]}
 
 Predicts, for a 2-D occupancy map with a start and a goal, the region that good paths probably run
-through: the generator of {_describe_network(record["recipe"])}, trained against a map and a
-point discriminator, exported as TorchScript on {record["date"]} with torch {record["torch"]}.
+through: the generator of {_describe_network(record["recipe"])},
+{_describe_training(record["recipe"])}, exported as
+TorchScript on {record["date"]} with torch {record["torch"]}.
 
 - Input: {record["inputs"]}
 - Output: {record["outputs"]}
@@ -265,6 +261,12 @@ def _describe_network(recipe: dict[str, Any]) -> str:
     if kinds == ["channel", "spatial"]:
         return "a convolutional block attention GAN (CBAGAN-RRT)"
     return f"a GAN with {' and '.join(kinds) or 'no'} attention"
+
+
+def _describe_training(recipe: dict[str, Any]) -> str:
+    if not recipe.get("adversarial_weight"):
+        return "trained for segmentation alone, without discriminators"
+    return "trained against a map and a point discriminator"
 
 
 def _update_manifest(model: Path, force: bool) -> None:

@@ -10,6 +10,7 @@ from torch import Tensor, nn
 from torch.nn.parallel import DistributedDataParallel
 
 from ..errors import ConfigError
+from ..networks.discriminator import Discriminator
 from ..networks.factory import make_discriminator, make_generator
 from .config import TrainingConfig
 from .distributed import ProcessGroup, synchronize_batch_norm
@@ -18,14 +19,16 @@ from .distributed import ProcessGroup, synchronize_batch_norm
 class Gan:
     """The generator, its exponential moving average, and two discriminators, with optimisers.
 
+    With an ``adversarial_weight`` of 0 there are no discriminators.
+
     Each optimiser (AdamW; Loshchilov and Hutter, "Decoupled weight decay regularization", 2019,
     https://arxiv.org/abs/1711.05101) owns the weights of one network and of no other.
 
     Attributes:
         group: the processes that train together.
         generator: a generator of :mod:`cbagan_ompl.networks`.
-        map_discriminator: sees the map image.
-        point_discriminator: sees the point image.
+        discriminators: ``map_discriminator``, which sees the map image, and
+            ``point_discriminator``, which sees the point image; or none.
         average: the moving average of the generator.
         learning_rates: the highest one of each trained network.
         optimizers: of each trained network.
@@ -42,8 +45,12 @@ class Gan:
         torch.manual_seed(config.seed)
         self.group = group or ProcessGroup()
         self.generator = make_generator(config.network)
-        self.map_discriminator = make_discriminator(config.network)
-        self.point_discriminator = make_discriminator(config.network)
+        self.discriminators: dict[str, Discriminator] = {}
+        if config.adversarial_weight:
+            self.discriminators = {
+                name: make_discriminator(config.network)
+                for name in ("map_discriminator", "point_discriminator")
+            }
         self.average = copy.deepcopy(self.generator).requires_grad_(False).eval()
         self.learning_rates = {
             "generator": config.generator_lr,
@@ -51,9 +58,9 @@ class Gan:
             "point_discriminator": config.point_discriminator_lr,
         }
         self.optimizers: dict[str, torch.optim.Optimizer] = {}
+        self._networks: dict[str, nn.Module] = {"generator": self.generator, **self.discriminators}
         self._trained: dict[str, nn.Module] = {}
-        for name, learning_rate in self.learning_rates.items():
-            network = getattr(self, name)
+        for name, network in self._networks.items():
             if self.group.size > 1:
                 synchronize_batch_norm(network)
             _move(network, device)
@@ -62,11 +69,12 @@ class Gan:
                 self._trained[name] = DistributedDataParallel(network)
             self.optimizers[name] = torch.optim.AdamW(
                 network.parameters(),
-                lr=learning_rate,
+                lr=self.learning_rates[name],
                 betas=(config.beta1, config.beta2),
                 weight_decay=config.weight_decay,
             )
         _move(self.average, device)
+        self._networks["average"] = self.average
         self._precision = torch.autocast(
             device.type, torch.bfloat16, enabled=config.precision == "bfloat16"
         )
@@ -80,7 +88,7 @@ class Gan:
             trained: the backward pass reaches the weights of the network, and their gradients are
                 averaged over the processes. False for a discriminator in a step of the generator.
         """
-        network = self._trained[name] if trained else getattr(self, name)
+        network = self._trained[name] if trained else self._networks[name]
         with self._precision:
             output: Tensor = network(*inputs)
         return output.float()
@@ -110,7 +118,9 @@ class Gan:
 
     def state_dict(self) -> dict[str, Any]:
         """Return the weights and the states of the optimisers."""
-        state: dict[str, Any] = {name: getattr(self, name).state_dict() for name in self._networks}
+        state: dict[str, Any] = {
+            name: network.state_dict() for name, network in self._networks.items()
+        }
         state["optimizers"] = {name: opt.state_dict() for name, opt in self.optimizers.items()}
         return state
 
@@ -120,8 +130,8 @@ class Gan:
         Raises:
             Exception: of many types, for a state of other networks or a damaged one.
         """
-        for name in self._networks:
-            getattr(self, name).load_state_dict(state[name])
+        for name, network in self._networks.items():
+            network.load_state_dict(state[name])
         for name, optimizer in self.optimizers.items():
             before = [dict(group) for group in optimizer.param_groups]
             optimizer.load_state_dict(state["optimizers"][name])
@@ -131,21 +141,21 @@ class Gan:
         """Take over the weights of another run; the generator those of the average there.
 
         Args:
-            state: what :meth:`state_dict` of the other run returned.
+            state: what :meth:`state_dict` of the other run returned. Discriminators that it does
+                not have keep their first weights.
 
         Raises:
             ConfigError: the weights belong to networks of another architecture.
         """
         try:
-            for name in self._networks:
-                weights = state["average" if name == "generator" else name]
-                getattr(self, name).load_state_dict(weights)
+            for name, network in self._networks.items():
+                source = "average" if name == "generator" else name
+                if source in state:
+                    network.load_state_dict(state[source])
         except Exception as error:  # torch raises several types
             raise ConfigError(
                 "the run to start from has other networks: set the same options of the networks"
             ) from error
-
-    _networks = ("generator", "map_discriminator", "point_discriminator", "average")
 
 
 def _check_optimizer(optimizer: torch.optim.Optimizer, groups: list[dict[str, Any]]) -> None:

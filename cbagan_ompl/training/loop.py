@@ -16,14 +16,16 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from ..common.files import as_path, make_folder, write_atomically
+from ..common.memory import translate_lack_of_memory
 from ..datasets.dataset import Tasks
 from ..errors import ConfigError, show
 from ..inference.model_files import translate_damage
 from .batches import Batch, check_trainable, encode, make_batch, scale_down
-from .checkpoints import BEST, LAST, SCHEMA, best_generator, load_checkpoint, save_checkpoint
-from .config import TrainingConfig
+from .checkpoints import SCHEMA, best_generator, load_checkpoint, save_checkpoint
+from .config import BEST, LAST, TrainingConfig
 from .distributed import ProcessGroup, pick_device, process_group
 from .gan import Gan
+from .model_weights import starting_weights
 from .schedule import learning_rate_factor, plateau_factor
 from .steps import adversarial_weights, discriminator_step, generator_step
 from .task_sources import TaskSource
@@ -77,7 +79,7 @@ def train(
     progress: bool = True,
     tensorboard: bool = False,
 ) -> dict[str, Any]:
-    """Train the three networks.
+    """Train the generator, against two discriminators unless their weight is 0.
 
     After each epoch the folder holds ``last.pt`` (everything needed to resume), ``best.pt`` (the
     epoch with the highest region IoU on the validation tasks, the one to export) and ``log.jsonl``
@@ -90,9 +92,11 @@ def train(
         config: the recipe.
         output: the folder for the files, made if missing.
         resume: go on from ``last.pt`` in that folder, or begin where a run ended before its first
-            epoch; without it the folder must hold no run.
-        start_from: checkpoint of another run of the same networks, whose weights this one begins
-            with.
+            epoch; without it the folder must hold no run. The recipe may ask for more epochs than
+            the run began with: from there on the learning rates are those of the longer run.
+        start_from: checkpoint of another run of the same networks, or an exported model (a file
+            or the name of a bundled one), whose weights this run begins with. Discriminators are
+            in checkpoints alone.
         device: ``auto`` (a GPU if there is one), ``cpu``, ``cuda``, ...
         progress: show a progress bar.
         tensorboard: write losses and scores for TensorBoard into the folder as well.
@@ -104,20 +108,23 @@ def train(
     Raises:
         ConfigError: ``resume`` with another recipe or other tasks, or without it although the
             folder holds a run; ``start_from`` with other networks; the folder cannot be made; no
-            such device; the loss is not finite; or the processes cannot share a batch evenly.
+            such device; the loss is not finite; the processes cannot share a batch evenly; or
+            there is not enough memory.
         DatasetError: the images are of a size that the networks cannot take.
         MissingDependencyError: ``tensorboard`` without the package of that name.
         ModelError: a checkpoint that cannot be read or written.
     """
     folder, target = as_path(output), pick_device(device)
     check_trainable(source.size, config)
-    with process_group(target) as group:
+    task = f"to train on batches of {config.batch_size} images of {source.size} pixels"
+    cure = "lower batch_size (--set batch_size=N), or train smaller networks"
+    with translate_lack_of_memory(ConfigError, task, cure), process_group(target) as group:
         if config.batch_size % group.size:
             raise ConfigError(
                 f"batches of {config.batch_size} cannot be shared evenly by {group.size} processes"
             )
         resume = group.from_leader(_prepare_folder(folder, resume) if group.is_leader else None)
-        run = _start_run(config, target, group, start_from)
+        run = _start_run(config, target, group, None if resume else start_from, source)
         if resume:
             state = _load_matching(folder / LAST, config, source) if group.is_leader else None
             state = group.from_leader(state)
@@ -147,6 +154,7 @@ def _start_run(
     device: torch.device,
     group: ProcessGroup,
     start_from: str | PathLike[str] | None,
+    source: TaskSource,
 ) -> Run:
     run = Run(
         Gan(config, device, group),
@@ -154,7 +162,7 @@ def _start_run(
         torch.Generator().manual_seed(config.seed),
     )
     if start_from is not None:
-        run.gan.start_from(load_checkpoint(start_from)["gan"])
+        run.gan.start_from(starting_weights(start_from, source.validation))
     return run
 
 
@@ -275,7 +283,7 @@ def _step(
     batch, noise = Batch(*map(shard, vars(batch).values())), shard(noise)
     images = encode(batch)
     fake = gan.run("generator", images.map, images.points, noise)
-    if step % config.adversarial_every:
+    if not config.adversarial_weight or step % config.adversarial_every:
         return generator_step(gan, config, batch, images, fake, None)
     errors = discriminator_step(gan, images, fake)
     weights = adversarial_weights(config, errors)
@@ -300,11 +308,16 @@ def _load_matching(path: Path, config: TrainingConfig, source: TaskSource) -> di
     """Return the checkpoint to resume from, which must have the same recipe and tasks."""
     state = load_checkpoint(path)
     saved, wanted = state["config"], config.to_dict()
-    changed = [name for name in wanted if saved.get(name) != wanted[name]]
+    changed = [name for name in wanted if name != "epochs" and saved.get(name) != wanted[name]]
     if changed:
         raise ConfigError(
             f"{path} was written with other values of {', '.join(changed)}; "
             "resume with the recipe that the run began with"
+        )
+    if config.epochs < len(state["history"]):
+        raise ConfigError(
+            f"{path} has {len(state['history'])} epochs behind it, more than the {config.epochs} "
+            "asked for"
         )
     if state["dataset"] != source.description():
         raise ConfigError(f"{path} belongs to another data set: {show(state['dataset'])}")

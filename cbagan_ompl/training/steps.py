@@ -72,10 +72,9 @@ def generator_step(
             config.positive_weight,
         ),
     }
-    discriminators = (gan.map_discriminator, gan.point_discriminator)
     if weights is not None:
         # The discriminators pass gradients on to the image, but collect none for themselves.
-        for discriminator in discriminators:
+        for discriminator in gan.discriminators.values():
             discriminator.requires_grad_(False)
         map_logits = gan.run("map_discriminator", images.map, fake, trained=False)
         point_logits = gan.run("point_discriminator", images.points, fake, trained=False)
@@ -91,7 +90,7 @@ def generator_step(
         config.pixel_weight,
     )
     _descend(loss, gan.optimizers["generator"], config.clip_norm)
-    for discriminator in discriminators:
+    for discriminator in gan.discriminators.values():
         discriminator.requires_grad_(True)
     return gan.group.means({name: value.item() for name, value in parts.items()})
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from multiprocessing import active_children
 from typing import Any, Protocol
 
-from ..common.parallel import fork_server, prepare_worker, run_call
+from ..common.parallel import fork_server, prepare_worker, run_call, why_died
 from ..common.signals import interrupts_held
 from ..common.validation import require, whole_number
 from ..datasets.dataset import Dataset, Tasks
@@ -159,7 +159,7 @@ def _translate_process_death() -> Iterator[None]:
         yield
     except BrokenProcessPool as error:
         raise DatasetError(
-            "a process that generates synthetic maps has died, perhaps for lack of memory"
+            f"a process that generates synthetic maps has died, {why_died()}"
         ) from error
 
 

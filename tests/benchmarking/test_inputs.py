@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.fuzzing import mutations, read_all
 
 from cbagan_ompl import ConfigError, GridMap, Task, __version__
 from cbagan_ompl.benchmarking.benchmark import Benchmark
@@ -13,13 +14,14 @@ from cbagan_ompl.benchmarking.inputs import check_same, read_record, record_inpu
 from cbagan_ompl.benchmarking.settings import Settings
 from cbagan_ompl.benchmarking.tasks import BenchmarkTask
 from cbagan_ompl.planning.compat import ompl_version
+from cbagan_ompl.planning.workspace import Workspace
 
 START, GOAL = (10.0, 10.0), (240.0, 240.0)
 
 
 def test_a_record_identifies_versions_maps_and_tasks(two_walls: GridMap) -> None:
     settings = Settings(("RRT",), ("uniform", "corridor"))
-    task = BenchmarkTask(two_walls, 0, Task(START, GOAL, 325.5, "walls"))
+    task = BenchmarkTask(Workspace(two_walls), 0, Task(START, GOAL, 325.5, "walls"))
     record = record_inputs([task], settings)
     assert record.items() >= settings.to_dict().items()
     assert record["package_version"] == __version__
@@ -49,17 +51,17 @@ def test_the_same_cells_elsewhere_are_another_map(
     two_walls: GridMap, tmp_path: Path, changes: dict[str, Any]
 ) -> None:
     settings, task = Settings(("RRT",), ("uniform",)), Task(START, GOAL)
-    before = record_inputs([BenchmarkTask(two_walls, 0, task)], settings)
+    before = record_inputs([BenchmarkTask(Workspace(two_walls), 0, task)], settings)
     saved = tmp_path / "settings.json"
     saved.write_text(json.dumps(before))
     check_same(before, saved)
     moved = GridMap(two_walls.free, name=two_walls.name, **changes)
     with pytest.raises(ConfigError, match="maps two_walls"):
-        check_same(record_inputs([BenchmarkTask(moved, 0, task)], settings), saved)
+        check_same(record_inputs([BenchmarkTask(Workspace(moved), 0, task)], settings), saved)
 
 
 def test_heat_maps_of_another_content_are_refused(two_walls: GridMap, tmp_path: Path) -> None:
-    task = BenchmarkTask(two_walls, 0, Task(START, GOAL))
+    task = BenchmarkTask(Workspace(two_walls), 0, Task(START, GOAL))
     file = tmp_path / "two_walls_0.npy"
     np.save(file, np.ones(two_walls.shape, np.float32))
     settings = Settings(("RRT",), ("uniform", "peer"), heatmap_dirs={"peer": str(tmp_path)})
@@ -71,7 +73,7 @@ def test_heat_maps_of_another_content_are_refused(two_walls: GridMap, tmp_path: 
 
 
 def test_models_of_another_content_are_refused(two_walls: GridMap, tmp_path: Path) -> None:
-    task = BenchmarkTask(two_walls, 0, Task(START, GOAL))
+    task = BenchmarkTask(Workspace(two_walls), 0, Task(START, GOAL))
     model = tmp_path / "m.pt"
     settings = Settings(("RRT",), ("uniform", "mine"), models={"mine": str(model)})
     model.write_bytes(b"one")
@@ -83,7 +85,7 @@ def test_models_of_another_content_are_refused(two_walls: GridMap, tmp_path: Pat
 
 
 def test_logs_without_settings_are_not_taken_over(two_walls: GridMap, tmp_path: Path) -> None:
-    task = BenchmarkTask(two_walls, 0, Task(START, GOAL))
+    task = BenchmarkTask(Workspace(two_walls), 0, Task(START, GOAL))
     (tmp_path / "logs").mkdir()
     (tmp_path / "logs" / "two_walls_0.log").write_text("")
     for resume in (False, True):
@@ -96,3 +98,17 @@ def test_large_records_are_refused(tmp_path: Path) -> None:
     path.write_bytes(b" " * (2**24 + 1))
     with pytest.raises(ConfigError, match="more than the 16 MiB"):
         read_record(path)
+
+
+def test_damaged_records_are_read_or_refused(two_walls: GridMap, tmp_path: Path) -> None:
+    settings = Settings(("RRT", "RRTstar"), ("uniform",), parameters={"RRTstar": {"goal_bias": 0}})
+    record = record_inputs([BenchmarkTask(Workspace(two_walls), 0, Task(START, GOAL))], settings)
+    path = tmp_path / "settings.json"
+
+    def read(data: bytes) -> None:
+        path.write_bytes(data)
+        check_same(record, path)
+
+    counts = read_all(read, mutations([json.dumps(record, indent=2).encode()], 600, seed=0))
+    assert counts["read"] > 3
+    assert counts["refused"] > 500

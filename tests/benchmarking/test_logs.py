@@ -177,8 +177,12 @@ def test_truncated_logs_are_refused_wherever_they_end(finished: Finished) -> Non
             parse_log(text[:end])
 
 
-@pytest.mark.slow
-def test_damaged_logs_are_read_or_refused(finished: Finished, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("count", "seed"), [(400, 0), pytest.param(3000, 1, marks=pytest.mark.slow)]
+)
+def test_damaged_logs_are_read_or_refused(
+    finished: Finished, tmp_path: Path, count: int, seed: int
+) -> None:
     path = tmp_path / "x.log"
     valid = [format_log(log).encode() for log in finished.logs]
 
@@ -186,9 +190,9 @@ def test_damaged_logs_are_read_or_refused(finished: Finished, tmp_path: Path) ->
         path.write_bytes(data)
         read_log(path)
 
-    counts = read_all(read, mutations(valid, 2000, 1))
-    assert counts["refused"] > 500
-    assert counts["read"] > 20
+    counts = read_all(read, mutations(valid, count, seed))
+    assert counts["refused"] > count / 4
+    assert counts["read"] > count / 100
 
 
 # Texts of nearly the largest size that are as costly to read as possible.

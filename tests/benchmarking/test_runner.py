@@ -18,6 +18,7 @@ from cbagan_ompl.benchmarking.runner import run_jobs
 from cbagan_ompl.benchmarking.settings import Settings
 from cbagan_ompl.benchmarking.tasks import BenchmarkTask
 from cbagan_ompl.benchmarking.worker import Job
+from cbagan_ompl.planning.workspace import Workspace
 
 
 @pytest.mark.usefixtures("interruptible")
@@ -25,7 +26,7 @@ def test_an_interrupt_while_a_process_starts_leaves_none(
     two_walls: GridMap, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     settings = Settings(("RRTstar",), ("uniform",), runs=99)
-    tasks = [BenchmarkTask(two_walls, i, Task((10, 10), (240, 240))) for i in range(3)]
+    tasks = [BenchmarkTask(Workspace(two_walls), i, Task((10, 10), (240, 240))) for i in range(3)]
     jobs = [Job(task, settings, tmp_path / f"{task.name}.log") for task in tasks]
     start, started = ForkServerProcess.start, []
 
@@ -55,7 +56,7 @@ def test_crashes_are_reported_with_their_task(two_walls: GridMap, tmp_path: Path
     good = Settings(("RRT",), ("uniform", "corridor"), runs=1, time=0.2, range=20)
     bad = Settings(("Magic",), ("uniform",), runs=1)
     tasks = [
-        kind(two_walls, number, Task((10, 10), (240, 240)))
+        kind(Workspace(two_walls), number, Task((10, 10), (240, 240)))
         for number, kind in enumerate((Aborting, BenchmarkTask, BenchmarkTask))
     ]
     jobs = [
@@ -78,12 +79,13 @@ from cbagan_ompl.benchmarking.runner import run_jobs
 from cbagan_ompl.benchmarking.tasks import BenchmarkTask
 from cbagan_ompl.benchmarking.settings import Settings
 from cbagan_ompl.benchmarking.worker import Job
+from cbagan_ompl.planning.workspace import Workspace
 
 class Telling(BenchmarkTask):
     def __reduce__(self):
         return eval, ("__import__('os')._exit(3 if 'torch' in __import__('sys').modules else 4)",)
 
-task = Telling(GridMap(np.ones((9, 9), bool)), 0, Task((1, 1), (8, 8)))
+task = Telling(Workspace(GridMap(np.ones((9, 9), bool))), 0, Task((1, 1), (8, 8)))
 settings = Settings(("RRT",), ("uniform", "mine"), models={"mine": "mine.pt"})
 print(run_jobs([Job(task, settings, Path("x.log"))], 1, show_progress=False))
 """

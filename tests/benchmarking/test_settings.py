@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from cbagan_ompl import ConfigError
 from cbagan_ompl.benchmarking.settings import Settings, parse_parameters
-from cbagan_ompl.sampling.options import Adaptation, SamplerOptions
+from cbagan_ompl.sampling.options import Adaptation, HeadingSpread, SamplerOptions
 
 
 def test_parameters_from_texts() -> None:
@@ -36,9 +37,16 @@ def test_saved_settings_have_flat_keys() -> None:
         "adaptation": ["coverage"],
         "sharpness": 2.0,
         "seed": 7,
+        "heading": asdict(HeadingSpread()),
         "models": {},
         "heatmap_dirs": {},
-        "radius": 0.0,
+        "robot": {
+            "shape": "point",
+            "radius": 0.0,
+            "corners": [],
+            "turning_radius": None,
+            "reverse": False,
+        },
         "within": 5,
     }
 

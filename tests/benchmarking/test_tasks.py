@@ -8,6 +8,8 @@ import pytest
 
 from cbagan_ompl import ConfigError, GridMap, Task, TaskError
 from cbagan_ompl.benchmarking.tasks import BenchmarkTask, random_tasks, select_tasks
+from cbagan_ompl.planning.workspace import Workspace
+from cbagan_ompl.robots.robot import Robot
 
 
 @pytest.fixture
@@ -42,7 +44,7 @@ def test_random_tasks_need_room() -> None:
     free = np.zeros((100, 100), bool)
     free[:3, :3] = True
     with pytest.raises(TaskError, match="found no 2 tasks"):
-        random_tasks(GridMap(free), 2, 0)
+        random_tasks(Workspace(GridMap(free)), 2, 0)
 
 
 def test_tasks_are_checked(image: str, tmp_path: Path) -> None:
@@ -58,10 +60,10 @@ def test_tasks_are_checked(image: str, tmp_path: Path) -> None:
 
 def test_names_have_no_blanks() -> None:
     grid = GridMap(np.ones((9, 9), bool), name="my map/1")
-    assert BenchmarkTask(grid, 2, Task((0, 0), (1, 1))).name == "my_map_1_2"
+    assert BenchmarkTask(Workspace(grid), 2, Task((0, 0), (1, 1))).name == "my_map_1_2"
 
 
 def test_tasks_are_found_for_inflated_maps() -> None:
-    tasks = select_tasks(["bundled:maze"], radius=1.0)
+    tasks = select_tasks(["bundled:maze"], robot=Robot.disc(1.0))
     assert [task.task for task in tasks] == [task.task for task in select_tasks(["bundled:maze"])]
     assert {task.grid.name for task in tasks} == {"maze (inflated by 1)"}

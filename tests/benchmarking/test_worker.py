@@ -9,14 +9,16 @@ from helpers.benchmarks import Finished
 from helpers.tasks import GOAL, START
 
 from cbagan_ompl import GridMap, Heatmap, HeatmapError, Task
+from cbagan_ompl.benchmarking.inputs import record_inputs
 from cbagan_ompl.benchmarking.logs import parse_log
 from cbagan_ompl.benchmarking.settings import Settings
 from cbagan_ompl.benchmarking.tasks import BenchmarkTask, heatmap_file
 from cbagan_ompl.benchmarking.worker import Job, run_job
+from cbagan_ompl.planning.workspace import Workspace
 
 
 def test_heat_maps_of_others(two_walls: GridMap, corridor: Heatmap, tmp_path: Path) -> None:
-    task = BenchmarkTask(two_walls, 0, Task(START, GOAL))
+    task = BenchmarkTask(Workspace(two_walls), 0, Task(START, GOAL))
     with pytest.raises(HeatmapError, match=r"neither .*two_walls_0\.npy nor two_walls_0\.png"):
         heatmap_file(str(tmp_path), task)
     cv2.imwrite(str(tmp_path / "two_walls_0.png"), (corridor.values * 255).astype(np.uint8))
@@ -33,6 +35,17 @@ def test_heat_maps_of_others(two_walls: GridMap, corridor: Heatmap, tmp_path: Pa
     ]
     assert int(log.planners[1].runs[0]["learned draws INTEGER"]) > 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["two_walls_0.png", "x.log"]
+
+
+def test_auto_is_the_corridor_of_a_small_map(tmp_path: Path) -> None:
+    grid = GridMap(np.ones((64, 64), bool), name="small")
+    task = BenchmarkTask(Workspace(grid), 0, Task((5, 5), (60, 60)))
+    settings = Settings(("RRT",), ("uniform", "auto"), runs=1, time=0.2)
+    run_job(Job(task, settings, tmp_path / "x.log"), lambda: None)
+    log = parse_log((tmp_path / "x.log").read_text())
+    assert log.planners[1].name == "geometric_RRT_auto"
+    assert int(log.planners[1].runs[0]["learned draws INTEGER"]) > 0
+    assert record_inputs([task], settings)["model_hashes"].keys() == {"learned"}
 
 
 def test_only_the_other_samplers_have_heat_maps(finished: Finished) -> None:

@@ -159,7 +159,9 @@ run()
 
 def run_with_small_files(limit: int, words: list[str]) -> tuple[int, str]:
     done = subprocess.run(
-        [sys.executable, "-c", _LIMITED, str(limit), *words], capture_output=True, text=True
+        [sys.executable, "-B", "-c", _LIMITED, str(limit), *words],
+        capture_output=True,
+        text=True,
     )
     return done.returncode, "".join(
         line for line in done.stderr.splitlines(True) if "round/s" not in line

@@ -43,6 +43,21 @@ def test_generate_import_and_noise_commands(
         assert message in capsys.readouterr().err
 
 
+def test_label_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["dataset", "label", "bundled:rooms", "--output", str(tmp_path / "set")]
+    words += ["--size", "64", "--tasks", "4", "--label", "rrt", "--runs", "2"]
+    report = tmp_path / "set.json"
+    assert main([*words, "--json", str(report)]) == 0
+    assert "4 tasks written" in capsys.readouterr().out
+    values = json.loads(report.read_text())
+    assert (values["maps"], values["side"], values["test_tasks"]) == (1, 64, 1)
+    assert main(words) == 2
+    assert "go on with it (--resume)" in capsys.readouterr().err
+    twice = ["dataset", "label", *["bundled:rooms"] * 2, "--output", str(tmp_path / "twice")]
+    assert main(twice) == 2
+    assert "a map is given twice" in capsys.readouterr().err
+
+
 def test_archives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = generate_small_set(tmp_path / "small")
     archive = tmp_path / "small.tar.gz"

@@ -96,6 +96,8 @@ def test_bad_options(model: Path, folder: Path, capsys: pytest.CaptureFixture[st
     for name in ("a/b", "a|b"):
         assert run(*words, "--predictions", f"{name}={folder}/tasks") == 2
         assert f"cannot be called {name!r}" in capsys.readouterr().err
+    assert run(*words, "--predictions", f"stored={folder}/none") == 2
+    assert "no such folder of predictions; a copy that `dataset" in capsys.readouterr().err
     # Before the work is done, not after it.
     assert run(*words, "--output", str(folder / "test.csv" / "scores")) == 2
     output = capsys.readouterr()

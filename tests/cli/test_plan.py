@@ -13,6 +13,7 @@ import pytest
 
 from cbagan_ompl import GridMap, Heatmap, tasks_of
 from cbagan_ompl.cli import main
+from cbagan_ompl.maps.grid_search import COMPILED, search_kind
 
 MAP = "bundled:walls_with_gaps"
 QUICK = ["plan", MAP, "--sampler", "corridor", "--planner", "RRT", "--time", "5", "--range", "20"]
@@ -35,6 +36,18 @@ def test_plan_writes_figure_and_json(tmp_path: Path, capsys: pytest.CaptureFixtu
     np.testing.assert_array_equal(values["start"], task.start)
     image = cv2.imread(str(figure))
     assert min(image.shape[:2]) > 500
+
+
+def test_auto_says_what_it_took(capsys: pytest.CaptureFixture[str]) -> None:
+    assert (
+        main(["plan", "bundled:maze", "--planner", "RRT", "--sampler", "auto", "--seed", "1"]) < 2
+    )
+    printed = capsys.readouterr().out
+    if search_kind() == COMPILED:
+        assert "\nsampler        corridor, hook" in printed
+        assert "\ngrid search    compiled\n" in printed
+    else:
+        assert "\nsampler        learned, hook" in printed
 
 
 def test_learned_is_the_default(capsys: pytest.CaptureFixture[str]) -> None:
@@ -120,6 +133,22 @@ def test_csv(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*QUICK, "--csv", str(table)]) == 2
     assert "say --force" in capsys.readouterr().err
     assert main([*QUICK, "--csv", "missing/path.csv"]) == 2
+
+
+def test_warnings_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cv2.imwrite(str(tmp_path / "hall.pgm"), np.full((40, 60), 205, np.uint8))
+    (tmp_path / "hall.yaml").write_text(
+        "image: hall.pgm\nresolution: 1\norigin: [0, 0, 0]\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.25\n"
+    )
+    words = ["plan", str(tmp_path / "hall.yaml"), "--sampler", "corridor", "--planner", "RRT"]
+    words += ["--start", "5,5", "--goal", "50,30"]
+    assert main(words) == 0
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("cbagan-ompl plan: warning: ")
+    assert "100% of the pixels have the gray level 205" in line
+    assert main([*words, "--unknown-is-free"]) == 0
+    assert capsys.readouterr().err == ""
 
 
 def test_heatmap_file(tmp_path: Path) -> None:
@@ -271,6 +300,24 @@ def test_no_input_is_replaced(tmp_path: Path, capsys: pytest.CaptureFixture[str]
             assert main([*words, option, str(path), *force]) == 2
             assert "it is what the command reads" in capsys.readouterr().err
     assert path.read_bytes() == before
+
+
+def test_what_a_map_names_is_an_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    image, scenes = tmp_path / "pixels.png", tmp_path / "cells.map.scen"
+    cv2.imwrite(str(image), np.full((40, 40), 255, np.uint8))
+    (tmp_path / "hall.yaml").write_text(
+        "image: pixels.png\nresolution: 1\norigin: [0, 0, 0]\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.2\n"
+    )
+    (tmp_path / "cells.map").write_text("type octile\nheight 9\nwidth 9\nmap\n" + "." * 9 + "\n")
+    scenes.write_text("version 1\n")
+    for name, path in (("hall.yaml", image), ("cells.map", scenes)):
+        before = path.read_bytes()
+        words = ["plan", str(tmp_path / name), "--start", "5,5", "--goal", "35,35"]
+        for option in ["--json", *(["--output"] if path == image else [])]:
+            assert main([*words, option, str(path), "--force"]) == 2
+            assert "it is what the command reads" in capsys.readouterr().err
+        assert path.read_bytes() == before
 
 
 def test_reports_are_replaced_by_reports_alone(tmp_path: Path) -> None:

@@ -7,11 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.synthetic import TINY_PATCHES
+from helpers.tiny_model import TINY
 from helpers.training_set import write_training_set
 
 pytest.importorskip("torch")
 
 from cbagan_ompl import ConfigError, DatasetError, GridMap
+from cbagan_ompl.cli import main
 from cbagan_ompl.cli.train import add_export_parser, add_train_parser
 from cbagan_ompl.inference.predictor import load_model
 from cbagan_ompl.training.checkpoints import load_checkpoint
@@ -21,6 +23,9 @@ from cbagan_ompl.training.export import export
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_training_set(tmp_path_factory.mktemp("data") / "tiny")
+
+
+STEP = "cbagan_ompl.training.loop._train_epoch"
 
 
 def run(*words: str) -> int:
@@ -50,6 +55,39 @@ def test_train_and_export_commands(
     words = ["export", str(tmp_path / "run/best.pt"), "--output", str(tmp_path / "tiny.pt")]
     assert run(*words) == 0
     assert {"tiny.pt", "tiny.md", "manifest.json"} <= {p.name for p in tmp_path.iterdir()}
+
+
+@pytest.mark.parametrize("kept", [False, True])
+def test_what_an_interrupt_leaves(
+    folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    kept: bool,
+) -> None:
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    recipe = tmp_path / "recipe.json"
+    recipe.write_text(json.dumps(TINY.to_dict()))
+    words = ["train", str(folder), "--output", str(tmp_path / "run"), "--config", str(recipe)]
+    monkeypatch.setattr("cbagan_ompl.training.loop._finish" if kept else STEP, interrupt)
+    assert main(words) == 130
+    said = capsys.readouterr().err.splitlines()[-1]
+    if kept:
+        assert said == "interrupted; go on with the same command and --resume"
+    else:
+        assert said == "interrupted before anything was kept; begin again with the same command"
+
+
+def test_segmentation_only(folder: Path, tmp_path: Path) -> None:
+    recipe = tmp_path / "recipe.json"
+    recipe.write_text(json.dumps(TINY.updated({"epochs": 1}).to_dict()))
+    words = ["--config", str(recipe), "--segmentation-only", "--device", "cpu"]
+    assert run("train", str(folder), "--output", str(tmp_path / "run"), *words) == 0
+    state = load_checkpoint(tmp_path / "run" / "best.pt")
+    assert state["config"]["adversarial_weight"] == 0
+    assert "map_discriminator" not in state["gan"]
 
 
 @pytest.mark.parametrize("words", [["--set", "epochs"], ["--set", "epoch=1"], ["--threads", "0"]])

@@ -65,7 +65,7 @@ UNREADABLE: list[tuple[Callable[[Path], Path], str]] = [
     (lambda _: Path("/dev/zero"), "it is a device or a pipe, not a file"),
     (lambda _: Path("/dev/full"), "it is a device or a pipe, not a file"),
     (lambda folder: folder / ("x" * 300), "File name too long"),
-    (lambda folder: folder / "a\0b", "embedded null byte"),
+    (lambda folder: folder / "a\0b", "embedded null"),
     (lambda folder: folder / "none" / "a", "No such file or directory"),
 ]
 
@@ -223,7 +223,7 @@ UNWRITABLE: list[tuple[Callable[[Path], Path], str]] = [
     (lambda _: Path("/dev/null"), "it is a device or a pipe, not a file"),
     (lambda folder: folder / "none" / "a", "No such file or directory"),
     (lambda folder: folder / ("x" * 300), "File name too long"),
-    (lambda folder: folder / "a\0b", "null byte"),
+    (lambda folder: folder / "a\0b", "embedded null"),
 ]
 
 
@@ -255,7 +255,7 @@ except ConfigError as error:
 def test_a_full_disk_leaves_the_old_file(tmp_path: Path) -> None:
     (tmp_path / "a").write_text("old")
     done = subprocess.run(
-        [sys.executable, "-c", _FULL_DISK, str(tmp_path / "a")],
+        [sys.executable, "-B", "-c", _FULL_DISK, str(tmp_path / "a")],
         capture_output=True,
         text=True,
         check=True,

@@ -115,6 +115,39 @@ def test_the_first_of_several_held_signals_counts(
     assert done == [True]
 
 
+@pytest.mark.usefixtures("interruptible")
+@pytest.mark.parametrize("at", [1, 2])
+def test_a_second_interrupt_while_handlers_are_set_back(
+    monkeypatch: pytest.MonkeyPatch, at: int
+) -> None:
+    """Ctrl-C comes right after a handler is back, while the other one is not yet."""
+    set_handler, calls = signal.signal, []
+
+    def stop(number: int, frame: object) -> None:
+        raise Terminated
+
+    def interrupting(number: int, handler: object) -> object:
+        before = set_handler(number, handler)
+        if handler in (stop, signal.default_int_handler):
+            calls.append(number)
+            if len(calls) == at:
+                signal.raise_signal(INT)
+        return before
+
+    def block() -> None:
+        with interrupts_held():
+            signal.raise_signal(INT)
+            monkeypatch.setattr(signal, "signal", interrupting)
+
+    before = set_handler(TERM, stop)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            block()
+        assert handlers() == [signal.default_int_handler, stop]
+    finally:
+        set_handler(TERM, before)
+
+
 @pytest.mark.usefixtures("raising")
 def test_blocks_in_blocks() -> None:
     done = []

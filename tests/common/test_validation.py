@@ -155,10 +155,10 @@ def test_packages() -> None:
     with pytest.raises(MissingDependencyError) as caught:
         require("no_such_package_at_all", "train")
     assert "this needs no_such_package_at_all, which cannot be imported" in str(caught.value)
-    assert "pip install 'cbagan-ompl[train]'" in str(caught.value)
+    assert "in the clone of cbagan-ompl with: pip install -e '.[train]'" in str(caught.value)
 
 
 def test_torch_is_named_where_it_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "torch", None)
-    with pytest.raises(MissingDependencyError, match=r"this needs torch.*cbagan-ompl\[torch\]"):
+    with pytest.raises(MissingDependencyError, match=r"this needs torch.*in the clone.*\[torch\]"):
         require_torch()

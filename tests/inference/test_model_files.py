@@ -137,9 +137,22 @@ def test_bundled_model_of_a_wheel_and_of_a_checkout(
 ) -> None:
     package = tmp_path / "cbagan_ompl"
     monkeypatch.setattr(model_files, "__file__", str(package / "inference" / "model_files.py"))
-    with pytest.raises(ModelError, match="no bundled model"):
+    with pytest.raises(ModelError, match=r"no bundled model"):
         load_model()
     for folder in (tmp_path / "models", package / "models"):
         shutil.copytree(exported.parent, folder)
         assert model_files.bundled_model() == folder / "tiny.pt"
     assert load_model().record["name"] == "tiny"
+    assert model_files.find_model("tiny") == package / "models" / "tiny.pt"
+
+
+def test_names_of_bundled_models(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert load_model("cbagan").record["name"] == "cbagan"
+    assert model_files.find_model("cbagan-worlds") == model_files.bundled_model()
+    with pytest.raises(ModelError, match=r"no bundled model 'cbagen': give one of .*cbagan, cb"):
+        load_model("cbagen")
+    for path in ("cbagan.pt", "./cbagan", Path("cbagan")):
+        assert model_files.find_model(path) == Path(path)
+    monkeypatch.chdir(tmp_path)
+    Path("cbagan").touch()
+    assert model_files.find_model("cbagan") == Path("cbagan"), "a file of the user's comes first"

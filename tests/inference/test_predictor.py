@@ -9,7 +9,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from cbagan_ompl import GridMap, Heatmap, MissingDependencyError, TaskError
+from cbagan_ompl import GridMap, Heatmap, MissingDependencyError, ModelError, TaskError
 from cbagan_ompl.inference.predictor import Predictor, load_model
 
 
@@ -130,6 +130,14 @@ def test_tasks_that_cannot_be_predicted(
 def test_tasks_outside_the_map(predictor: Predictor) -> None:
     with pytest.raises(TaskError):
         predictor.predict(GridMap(np.ones((20, 20))), (1, 1), (50, 50))
+
+
+def test_lack_of_memory_is_said() -> None:
+    def greedy(free: torch.Tensor, start: torch.Tensor, goal: torch.Tensor) -> torch.Tensor:
+        return torch.empty(2**50)
+
+    with pytest.raises(ModelError, match=r"not enough memory .*\(1, 1, 64, 64\): give it fewer"):
+        Predictor(greedy, {"working_size": 64}).predict(GridMap(np.ones((64, 64))), (1, 1), (9, 9))
 
 
 def test_the_package_does_not_import_torch() -> None:

@@ -34,6 +34,14 @@ def test_messages_tell_wall_margin_and_unknown_apart(grid: GridMap) -> None:
             space.check_task(point, goal)
 
 
+def test_margin_is_told_where_the_map_before_is_gone() -> None:
+    free = np.ones((20, 30), bool)
+    free[:, 14:16] = False
+    inflated = GridMap(free, name="hall").inflated(1).inflated(1)
+    with pytest.raises(TaskError, match="too close to an obstacle of hall for the robot's radius"):
+        inflated.check_task((12.5, 5), (25, 10))
+
+
 def test_snap_moves_a_point_no_farther_than_it_must(grid: GridMap) -> None:
     np.testing.assert_array_equal(grid.snap((5, 5), 3), (5, 5))
     moved = grid.snap((14.2, 5.5), 1)
@@ -84,8 +92,7 @@ def test_what_is_a_point(grid: GridMap) -> None:
 def test_inflated_maps_are_kept(grid: GridMap) -> None:
     once = grid.inflated(2)
     assert grid.inflated(2.0) is once
-    assert once.bare is grid
-    assert grid.bare is grid
+    assert once.bare[1] is grid.free
     for radius in (0.5, 1, 1.5, 2.5):
         grid.inflated(radius)
     assert grid.inflated(2) is not once, "the oldest goes first"

@@ -1,10 +1,31 @@
 from __future__ import annotations
 
+import sys
+
 import numpy as np
+import pytest
 
 from cbagan_ompl.maps import grid_search
 from cbagan_ompl.maps.grid_map import GridMap
-from cbagan_ompl.maps.grid_search import pull_taut, shortest_path
+from cbagan_ompl.maps.grid_search import (
+    COMPILED,
+    SCIPY,
+    prepare_search,
+    pull_taut,
+    search_kind,
+    shortest_path,
+)
+
+
+@pytest.fixture(autouse=True, params=[COMPILED, SCIPY])
+def kind(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """What searches, in all tests."""
+    if request.param == COMPILED:
+        pytest.importorskip("numba")
+    else:
+        monkeypatch.setattr(grid_search, "_load_compiled", lambda: None)
+    assert search_kind() == request.param
+    return str(request.param)
 
 
 def length(path: np.ndarray) -> float:
@@ -44,7 +65,7 @@ def test_large_grids_are_searched_in_a_band() -> None:
     free = np.ones((700, 900), bool)
     free[300:320, :800] = False
     free[500, 100:] = False
-    whole = grid_search._search(free, (5, 5), (890, 690), np.ones(free.shape, np.float32))
+    whole = grid_search._search_graph(free, (5, 5), (890, 690), np.ones(free.shape, np.float32))
     path = shortest_path(free, (5, 5), (890, 690))
     assert path is not None
     assert whole is not None
@@ -75,3 +96,72 @@ def test_pulled_taut_path_is_free_and_shorter() -> None:
         assert GridMap(free).path_is_free(taut)
         assert length(taut) <= length(path) + 1e-9
         np.testing.assert_array_equal(taut[[0, -1]], path[[0, -1]] + 0.5)
+
+
+def cost_of(path: np.ndarray, cost: np.ndarray) -> float:
+    values = cost[path[:, 1], path[:, 0]]
+    return float((np.hypot(*np.diff(path, axis=0).T) * (values[1:] + values[:-1]) / 2).sum())
+
+
+@pytest.mark.parametrize("with_costs", [False, True])
+def test_paths_are_the_cheapest(with_costs: bool) -> None:
+    rng = np.random.default_rng(int(with_costs))
+    connected = 0
+    for _ in range(150):
+        height, width = rng.integers(1, 40, 2)
+        free = rng.random((height, width)) < rng.uniform(0.55, 1)
+        start, goal = (tuple(rng.integers((width, height)).tolist()) for _ in range(2))
+        free[start[::-1]] = free[goal[::-1]] = True
+        cost = np.ones((height, width), np.float32)
+        if with_costs:
+            cost = (0.02 + rng.random((height, width)) ** 4).astype(np.float32)
+        expected = grid_search._search_graph(free, start, goal, cost)
+        path = shortest_path(free, start, goal, cost if with_costs else None)
+        assert (path is None) == (expected is None)
+        if path is None or expected is None:
+            continue
+        connected += 1
+        assert path[0].tolist() == list(start)
+        assert path[-1].tolist() == list(goal)
+        assert (np.abs(np.diff(path, axis=0)).max(axis=1, initial=0) == 1).all()
+        assert GridMap(free).path_is_free(path + 0.5)
+        assert cost_of(path, cost) <= cost_of(expected, cost) + cost.min() / 4096
+    assert connected > 60
+
+
+def test_start_and_goal_in_one_pixel() -> None:
+    free = np.ones((3, 3), bool)
+    for cost in (None, np.ones((3, 3), np.float32)):
+        path = shortest_path(free, (1, 2), (1, 2), cost)
+        assert path is not None
+        assert path.tolist() == [[1, 2]]
+
+
+def test_masks_of_any_layout() -> None:
+    free = np.ones((30, 20), bool)
+    free[10, 3:] = False
+    expected = shortest_path(free, (15, 2), (15, 25))
+    assert expected is not None
+    for other in (np.asfortranarray(free), np.repeat(free, 2, axis=1)[:, ::2]):
+        path = shortest_path(other, (15, 2), (15, 25))
+        assert path is not None
+        assert length(path) == length(expected)
+        np.testing.assert_array_equal(pull_taut(other, path), pull_taut(free, path))
+
+
+def test_preparing_needs_no_numba(kind: str) -> None:
+    prepare_search()
+    prepare_search(with_costs=True)
+    assert search_kind() == kind
+
+
+def test_without_numba_scipy_searches(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.undo()
+    monkeypatch.setitem(sys.modules, "numba", None)
+    monkeypatch.delitem(sys.modules, "cbagan_ompl.maps.compiled_search", raising=False)
+    monkeypatch.delattr("cbagan_ompl.maps.compiled_search", raising=False)
+    grid_search._load_compiled.cache_clear()
+    try:
+        assert search_kind() == SCIPY
+    finally:
+        grid_search._load_compiled.cache_clear()

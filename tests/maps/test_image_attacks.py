@@ -189,6 +189,34 @@ def test_interlaced_png(size: tuple[int, int]) -> None:
         decode_image(png_file(size, interlaced_rows(pixels)[:-1], interlaced=True), "map")
 
 
+_JPEG_KINDS = {
+    "baseline": [],
+    "optimized": [cv2.IMWRITE_JPEG_OPTIMIZE, 1],
+    "restarts": [cv2.IMWRITE_JPEG_RST_INTERVAL, 3],
+    "progressive": [cv2.IMWRITE_JPEG_PROGRESSIVE, 1],
+}
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+@pytest.mark.parametrize("kind", _JPEG_KINDS)
+def test_jpeg_whose_data_end_too_early(
+    kind: str, channels: int, capfd: pytest.CaptureFixture[str]
+) -> None:
+    rng = np.random.default_rng(channels)
+    pixels = rng.integers(0, 2, (40, 56, channels)).repeat(3, axis=0).repeat(2, axis=1) * 255
+    data = _encode(".jpg", pixels.astype(np.uint8), *_JPEG_KINDS[kind])
+    whole = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    for end in (b"\xff\xd9", b"\xff\xff\xff\xd9", b"\xff\xd9 more"):
+        read = decode_pixels(data[:-2] + end, "map").values
+        np.testing.assert_array_equal(read, whole)
+    assert capfd.readouterr().err == ""
+    scan = data.rindex(b"\xff\xda") + 20
+    for cut in rng.integers(scan, len(data) - 20, 20):
+        # A decoder fills in what is missing between here and the mark of the end.
+        with pytest.raises(MapError, match="truncated or damaged"):
+            decode_pixels(data[:cut].rstrip(b"\xff") + b"\xff\xd9", "map")
+
+
 def test_pixels_in_many_chunks_and_small_surplus() -> None:
     packed = zlib.compress(_WHITE_ROWS + b"12345")
     chunks = b"".join(png_chunk(b"IDAT", packed[i : i + 1]) for i in range(len(packed)))

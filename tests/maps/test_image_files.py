@@ -11,6 +11,7 @@ from helpers.images import GRAYS, SHAPE, png_header, write_image
 
 from cbagan_ompl.errors import MapError
 from cbagan_ompl.maps.grid_map import GridMap
+from cbagan_ompl.maps.image_files import decode_image
 from cbagan_ompl.maps.raw_map import MAX_SIDE
 
 
@@ -87,6 +88,20 @@ def test_pgm_in_all_its_forms(tmp_path, data, free):
     path = tmp_path / "some.pgm"
     path.write_bytes(data)
     assert GridMap.load(path).free.tolist() == np.array(free, dtype=bool).tolist()
+
+
+@pytest.mark.parametrize("white", [9, 255, 65535])
+def test_plain_text_of_many_blocks(white: int) -> None:
+    rng = np.random.default_rng(white)
+    levels = rng.integers(0, white + 1, (700, 1000))
+    gaps = rng.choice(
+        [" ", "\n", "  ", "\r\n", "\t00", " #7\n", "#\n", "\n# long " + "comment" * 7 + "#\n"],
+        levels.size,
+    )
+    gaps[0] = ""
+    words = "".join(f"{gap}{level}" for gap, level in zip(gaps, levels.ravel(), strict=True))
+    data = f"P2 1000 700 {white}\n0000000000000000000000{words} more".encode()
+    assert decode_image(data, "map").gray.tolist() == levels.tolist()
 
 
 @pytest.mark.parametrize(
@@ -215,9 +230,9 @@ def test_huge_images_raise_by_their_header(tmp_path, data):
         (b"P5 3 3 256\n" + bytes(17), "and 8 are there"),
         (b"P2 3 1 255\n1 2", "and 2 are there"),
         (b"P2 3 1 255\n1 2 x", "no number"),
-        (b"P2 1 1 255\n99999999999999999999", "no number"),
+        (b"P2 1 1 255\n99999999999999999999", "outside 0 to 255"),
         (b"P2 3 1 9\n1 2 10", "outside 0 to 9"),
-        (b"P2 3 1 9\n1 2 -1", "outside 0 to 9"),
+        (b"P2 3 1 9\n1 2 -1", "no number: b'-1'"),
         (b"P5 1 1 100\n\xff", "outside 0 to 100"),
     ],
 )

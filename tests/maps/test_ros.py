@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from math import pi
 
 import cv2
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 from helpers.images import GRAYS, write_image
 
-from cbagan_ompl.errors import MapError
+from cbagan_ompl.errors import CbaganOmplWarning, MapError
 from cbagan_ompl.maps.grid_map import GridMap
 
 KEYS = {
@@ -58,10 +59,73 @@ def test_ros_yaw(ros):
 
 @pytest.mark.parametrize(("free_thresh", "free_205"), [("0.196", False), ("0.25", True)])
 def test_ros_unknown_gray_205_depends_on_free_thresh(ros, free_thresh, free_205):
-    grid = GridMap.load(ros(np.array([[0, 205, 254]], np.uint8), free_thresh=free_thresh))
+    path = ros(np.array([[0, 205, 254]], np.uint8), free_thresh=free_thresh)
+    with pytest.warns(CbaganOmplWarning) if free_205 else nullcontext():
+        grid = GridMap.load(path)
     assert grid.free.tolist() == [[False, free_205, True]]
 
 
+@pytest.mark.parametrize("image", ["image.pgm", "image.png"])
+def test_ros_warns_where_much_unknown_space_is_free(ros, tmp_path, image):
+    """As nav2's map saver writes it: 205 beside a free_thresh of 0.25."""
+    pixels = np.full((20, 20), 254, np.uint8)
+    pixels[:1, :8] = 205  # 2 %
+    path = ros(pixels, image=image, free_thresh="0.25")
+    with pytest.warns(CbaganOmplWarning, match=r"yaml: 2% of the pixels have .* 205") as said:
+        assert GridMap.load(path).free.all()
+    assert "free_thresh 0.25" in str(said[0].message)
+    assert said[0].filename == __file__, "the line of the caller"
+    if image == "image.png":
+        write_image(tmp_path / image, pixels.astype(np.uint16) * 257)
+        with pytest.warns(CbaganOmplWarning, match="2% of the pixels"):
+            GridMap.load(path)
+
+
+def test_ros_warns_of_nothing_else(ros):
+    """Warnings are errors in these tests."""
+    pixels = np.full((20, 20), 254, np.uint8)
+    pixels[0, :3] = 205  # below 1 %
+    GridMap.load(ros(pixels, free_thresh="0.25"))
+    pixels[:10] = 205
+    assert GridMap.load(ros(pixels, free_thresh="0.196")).free.mean() == 0.5
+    assert GridMap.load(ros(pixels, free_thresh="0.25"), unknown_is_free=True).free.all()
+    GridMap.load(ros(255 - pixels, free_thresh="0.25", negate="1"))
+    assert GridMap.load(ros(pixels // 100, free_thresh="0.25", mode="raw")).free.all()
+
+
+def test_ros_yaml_with_tabs(ros):
+    path = ros()
+    plain = GridMap.load(path)
+    path.write_text(path.read_text().replace(": ", ":\t").replace(", ", ",\t"))
+    tabbed = GridMap.load(path)
+    assert tabbed.free.tolist() == plain.free.tolist()
+    assert (tabbed.resolution, tabbed.origin) == (plain.resolution, plain.origin)
+
+
+def test_ros_image_in_the_home_folder(ros, tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    (tmp_path / "home" / "maps").mkdir(parents=True)
+    write_image(tmp_path / "home" / "maps" / "a.pgm", GRAYS)
+    path = ros(None, image="~/maps/a.pgm")
+    assert GridMap.load(path).free.tolist() == (GRAYS > 205).tolist()
+    with pytest.raises(MapError, match=r"key 'image' = '~nobody-there/a.pgm': the home of this"):
+        GridMap.load(ros(None, image="~nobody-there/a.pgm"))
+    with pytest.raises(MapError, match=r"key 'image' = None: must be the path of an image"):
+        GridMap.load(ros(None, image="~"))
+
+
+def test_ros_ppm_and_png_with_bytes_after_their_end(ros, tmp_path):
+    colour = cv2.cvtColor(GRAYS, cv2.COLOR_GRAY2BGR)
+    assert GridMap.load(ros(colour, image="a.ppm")).free.tolist() == (GRAYS > 205).tolist()
+    path = ros(GRAYS, image="a.png")
+    for count in (1, 57, 5000):
+        write_image(tmp_path / "a.png", GRAYS)
+        with open(tmp_path / "a.png", "ab") as file:
+            file.write(b"\0" * count)
+        assert GridMap.load(path).free.tolist() == (GRAYS > 205).tolist()
+
+
+@pytest.mark.filterwarnings("ignore:.*gray level 205")
 def test_ros_thresholds_are_met_by_equal_values(ros):
     # p of the gray level 204 is 0.2 exactly, that of 102 is 0.6.
     pixels = np.array([[101, 102, 103, 203, 204, 205]], np.uint8)

@@ -17,6 +17,7 @@ from cbagan_ompl.planning import compat
 from cbagan_ompl.planning.compat import ob, og, ou
 from cbagan_ompl.planning.ompl_benchmark import PlannerVariant, RunOptions, run_benchmark
 from cbagan_ompl.planning.problem import make_setup
+from cbagan_ompl.planning.workspace import Workspace
 from cbagan_ompl.sampling.options import NO_ADAPTATION
 from cbagan_ompl.sampling.sampler import HeatmapSampler
 
@@ -31,11 +32,15 @@ def quiet() -> None:
 
 
 def new_setup(grid: GridMap, planner: str = "RRTConnect", range: float = 20.0) -> Any:
-    setup = make_setup(grid, (np.array(START), np.array(GOAL)), 2.0)
+    setup = make_setup(Workspace(grid), (np.array(START), np.array(GOAL)), 2.0)
     instance = getattr(og, planner)(setup.getSpaceInformation())
     instance.setRange(range)
     setup.setPlanner(instance)
     return setup
+
+
+def positions(setup: Any) -> np.ndarray:
+    return np.array([(state[0], state[1]) for state in setup.getSolutionPath().getStates()])
 
 
 def is_as_before(setup: Any, grid: GridMap, range: float = 20.0) -> bool:
@@ -200,7 +205,7 @@ def test_solve_goes_on_and_begins_anew(two_walls: GridMap, corridor: Heatmap) ->
         assert compat.is_exact(setup.solve(2.0))
         assert attachment.sample_counts["learned"] > seen
         setup.simplifySolution()
-        path = compat.path_positions(setup.getSolutionPath())
+        path = positions(setup)
         assert two_walls.path_is_free(path)
         assert np.hypot(*(path[-1] - GOAL)) <= 2.0
 
@@ -290,7 +295,7 @@ def test_benchmark_of_ours(two_walls: GridMap, corridor: Heatmap) -> None:
     ]
     ends = np.array(START, float), np.array(GOAL, float)
     options = RunOptions(runs=3, time=2.0, range=20.0, tolerance=1.0)
-    recording = run_benchmark("two", two_walls, ends, variants, options)
+    recording = run_benchmark("two", Workspace(two_walls), ends, variants, options)
     assert all(run.sample_counts["learned"] > 0 for run in recording.runs["RRTConnect_own"])
     assert all(np.isfinite(run.cost) for runs in recording.runs.values() for run in runs)
 
@@ -317,7 +322,7 @@ def test_a_goal_with_many_states(two_walls: GridMap, corridor: Heatmap) -> None:
         with attach(setup, corridor, seed=seed) as attachment:
             assert compat.is_exact(setup.solve(5.0))
             assert attachment.sample_counts["learned"] > 5
-            end = compat.path_positions(setup.getSolutionPath())[-1]
+            end = positions(setup)[-1]
             assert np.hypot(*(end - GOAL)) <= 5.0
 
 

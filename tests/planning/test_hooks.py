@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.setups import path_positions
 from helpers.tasks import GOAL, START
 from scipy.stats import mannwhitneyu
 
@@ -74,7 +75,7 @@ def until(stop: Callable[[], bool], limit: int = 100_000) -> tuple[Any, list[int
 
 
 def path_end(setup: Any) -> np.ndarray:
-    return compat.path_positions(setup.getSolutionPath())[-1]
+    return path_positions(setup.getSolutionPath())[-1]
 
 
 def test_table_of_hooks() -> None:
@@ -102,7 +103,7 @@ def test_planner_draws_from_the_heatmap(
         least = 0.5 if planner == "STRIDE" else 1.0
         assert attachment.sample_counts["learned"] > least * attachment.sample_counts["uniform"]
         if compat.is_exact(status):
-            path = compat.path_positions(setup.getSolutionPath())
+            path = path_positions(setup.getSolutionPath())
             assert two_walls.path_is_free(path)
             assert np.hypot(*(path[-1] - GOAL)) <= 2.0
 

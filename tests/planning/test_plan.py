@@ -25,7 +25,10 @@ from cbagan_ompl import (
     plan,
     tasks_of,
 )
-from cbagan_ompl.planning import compat
+from cbagan_ompl.maps import grid_search
+from cbagan_ompl.maps.grid_search import COMPILED, SCIPY
+from cbagan_ompl.planning import compat, heatmap_sources
+from cbagan_ompl.planning.heatmap_sources import resolve_auto
 from cbagan_ompl.planning.hooks import hangs_on_python_termination
 from cbagan_ompl.planning.path_files import path_csv
 
@@ -266,7 +269,8 @@ BAD = [
     ({"start": (300, 10)}, TaskError, "start .300, 10. is outside two_walls"),
     ({"goal": (100, 65)}, TaskError, "goal .100, 65. is in an obstacle"),
     ({"goal": START}, TaskError, "same point"),
-    ({"start": (1, 2, 3)}, TaskError, "two finite numbers"),
+    ({"start": (1, 2, 3)}, TaskError, "start has a yaw, but the robot, a point, has no heading"),
+    ({"start": (1, 2, 3, 4)}, TaskError, "two finite numbers"),
     ({"start": (np.nan, 2)}, TaskError, "two finite numbers"),
     ({"start": "here"}, TaskError, "two finite numbers"),
     ({"planner": "RRTstarr"}, PlannerError, "no planner 'RRTstarr'.*RRTstar"),
@@ -371,3 +375,43 @@ def resident() -> int:
     """Resident memory in pages."""
     with open("/proc/self/statm") as statm:
         return int(statm.read().split()[1]) * resource.getpagesize()
+
+
+# --- the sampler "auto" -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", [COMPILED, SCIPY])
+def test_auto_takes_the_corridor_on_small_maps(monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
+    if kind == COMPILED:
+        pytest.importorskip("numba")
+    else:
+        monkeypatch.setattr(grid_search, "_load_compiled", lambda: None)
+    grid = GridMap(np.ones((100, 100), bool))
+    result = plan(grid, (5, 5), (90, 90), "RRT", "auto", seed=1)
+    assert (result.sampler, result.grid_search) == ("corridor", kind)
+    assert result.to_dict()["grid_search"] == kind
+    assert result.sample_counts["learned"] > 0
+
+
+def test_auto_takes_the_network_on_large_maps(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("torch")
+    monkeypatch.setattr(grid_search, "_load_compiled", lambda: None)
+    grid = GridMap(np.ones((200, 200), bool))
+    result = plan(grid, (5, 5), (190, 190), "RRT", "auto", seed=1)
+    assert (result.sampler, result.grid_search) == ("learned", SCIPY)
+
+
+def test_auto_without_torch_takes_the_corridor(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(grid_search, "_load_compiled", lambda: None)
+    monkeypatch.setattr(heatmap_sources, "find_spec", lambda name: None)
+    assert resolve_auto(GridMap(np.ones((200, 200), bool))) == "corridor"
+
+
+def test_auto_takes_no_heat_map(two_walls: GridMap) -> None:
+    with pytest.raises(ConfigError, match="auto sampler uses no model and no heat map"):
+        plan(two_walls, START, GOAL, "RRT", "auto", heatmap=np.ones(two_walls.shape))
+
+
+def test_other_samplers_search_nothing(two_walls: GridMap) -> None:
+    result = plan(two_walls, START, GOAL, "RRT", "straight-line", seed=1)
+    assert result.grid_search is None

@@ -15,12 +15,15 @@ from cbagan_ompl.sampling.options import (
     DEFAULT_UNIFORM_FRACTION,
     FULL_ADAPTATION,
     NO_ADAPTATION,
+    HeadingSpread,
 )
 
 
 def test_defaults() -> None:
     options = SamplerOptions()
-    assert options == SamplerOptions(DEFAULT_UNIFORM_FRACTION, None, FULL_ADAPTATION, None)
+    assert options == SamplerOptions(
+        DEFAULT_UNIFORM_FRACTION, None, FULL_ADAPTATION, None, HeadingSpread()
+    )
     assert 0 < options.uniform_fraction < 1
     assert options.adaptation == Adaptation(True, True, True)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import cv2
@@ -15,6 +16,17 @@ SCRIPTS = ROOT / "scripts"
 def test_overhead() -> None:
     printed = run_script(SCRIPTS / "overhead.py", "--rounds", "1", "--time", "0.1")
     assert "iterations per second inside" in printed
+
+
+@pytest.mark.slow
+def test_search_speed(tmp_path: Path) -> None:
+    pytest.importorskip("torch")
+    pytest.importorskip("numba")
+    words = ("--sizes", "64", "--tasks", "1", "--json", str(tmp_path / "speed.json"))
+    printed = run_script(SCRIPTS / "search_speed.py", *words)
+    assert printed.count("compiled") == 3
+    result = json.loads((tmp_path / "speed.json").read_text())
+    assert result["sizes"]["64"]["scipy_to_compiled"]["length"] == pytest.approx(1, abs=0.03)
 
 
 @pytest.mark.slow

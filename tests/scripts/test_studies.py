@@ -59,6 +59,36 @@ def test_paper_tables(folder: Path, tmp_path: Path) -> None:
         assert samplers["bundled"]["inference_ms"][0] > 0
 
 
+@pytest.mark.slow
+def test_headings(tmp_path: Path) -> None:
+    pytest.importorskip("torch")
+    rows, report = tmp_path / "rows.jsonl", tmp_path / "headings.json"
+    words = ["--maps", "bundled:rooms", "--tasks-per-map", "1", "--planners", "RRT"]
+    words += ["--spaces", "SE2", "--time", "0.2", "--first", "--rows", str(rows)]
+    for _ in range(2):  # the second time every run is there already
+        run_script(STUDIES / "headings.py", *words, "--json", str(report))
+        assert len(rows.read_text().splitlines()) == 3
+    summary = json.loads(report.read_text())["rows"]
+    samplers = ["OMPL's own", "positions only", "default"]
+    assert [row["sampler"] for row in summary] == samplers
+    assert all((row["inference_ms"] > 0) == (row["sampler"] != "OMPL's own") for row in summary)
+
+
+def test_replanning(tmp_path: Path) -> None:
+    pytest.importorskip("torch")
+    report = tmp_path / "replanning.json"
+    words = ["bundled:rooms", "--tasks-per-map", "1", "--cycles", "4", "--json", str(report)]
+    printed = run_script(STUDIES / "replanning.py", *words)
+    result = json.loads(report.read_text())
+    for scene in ("static", "obstacles"):
+        assert f"{scene} kept" in printed
+        assert result[scene].keys() == {"uniform", "fresh", "kept"}
+        assert all(of["cycles"] == 4 for of in result[scene].values())
+        assert result[scene]["uniform"]["kept"] == result[scene]["fresh"]["kept"] == 0
+    assert result["static"]["kept"]["kept"] >= 0.5
+
+
+@pytest.mark.slow
 def test_rrtconnect(tmp_path: Path) -> None:
     pytest.importorskip("torch")
     report = tmp_path / "rrtconnect.json"

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from helpers.synthetic import SMALL, TINY_PATCHES, threaded_source
 from helpers.tiny_model import TINY
@@ -15,6 +16,8 @@ torch = pytest.importorskip("torch")
 from cbagan_ompl import ConfigError
 from cbagan_ompl.training import loop
 from cbagan_ompl.training.checkpoints import load_checkpoint
+from cbagan_ompl.training.export import export
+from cbagan_ompl.training.gan import Gan
 from cbagan_ompl.training.loop import train
 from cbagan_ompl.training.task_sources import DatasetSource
 
@@ -55,6 +58,15 @@ def test_resumed_run_equals_uninterrupted(
     assert [entry["losses"] for entry in states[0]["history"]] == [
         entry["losses"] for entry in states[1]["history"]
     ]
+
+
+def test_lack_of_memory_is_said(
+    source: DatasetSource, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(loop, "discriminator_step", lambda *_: torch.empty(2**50))
+    said = r"not enough memory to train on batches of \d+ images of \d+ pixels: lower batch_size"
+    with pytest.raises(ConfigError, match=said):
+        train(source, TINY, tmp_path, device="cpu", progress=False)
 
 
 def test_a_resumed_run_on_synthetic_maps_equals_an_uninterrupted_one(
@@ -147,6 +159,137 @@ def test_resume_goes_on_where_a_run_ended_before_its_first_epoch(
     shutil.copy(tmp_path / "whole" / "best.pt", tmp_path / "run")
     run = train(source, config, tmp_path / "run", resume=True, device="cpu", progress=False)
     assert run["test"] == whole["test"]
+
+
+def test_a_longer_run_goes_on_where_a_shorter_one_ended(
+    source: DatasetSource, tmp_path: Path
+) -> None:
+    # A schedule that does not depend on the number of epochs.
+    long = TINY.updated({"schedule": "exponential"})
+    short = long.updated({"epochs": 1})
+    whole = train(source, long, tmp_path / "whole", device="cpu", progress=False)
+    train(source, short, tmp_path / "parts", device="cpu", progress=False)
+    parts = train(source, long, tmp_path / "parts", resume=True, device="cpu", progress=False)
+    assert parts["test"] == whole["test"]
+    states = [load_checkpoint(tmp_path / run / "last.pt") for run in ("whole", "parts")]
+    assert equal(states[0]["gan"], states[1]["gan"])
+    assert states[1]["config"]["epochs"] == 2
+    with pytest.raises(ConfigError, match="2 epochs behind it, more than the 1 asked for"):
+        train(source, short, tmp_path / "parts", resume=True, device="cpu", progress=False)
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ({"adversarial_every": 1}, [0, 1, 2]),
+        ({"adversarial_every": 2}, [0, 2]),
+        ({"adversarial_weight": 0}, []),
+    ],
+)
+def test_the_steps_with_discriminators(
+    source: DatasetSource, options: dict[str, Any], expected: list[int]
+) -> None:
+    config = TINY.updated(options)
+    gan = Gan(config, torch.device("cpu"))
+    run = loop.Run(gan, np.random.default_rng(0), torch.Generator())
+    tasks = source.epoch(0)
+    with_discriminators = []
+    for step in range(3):
+        losses = loop._step(run, config, tasks, np.arange(4), torch.device("cpu"), step)
+        assert {"pixel", "segmentation"} <= losses.keys()
+        both = {"adversarial", "map_discriminator", "point_discriminator"}
+        if losses.keys() & both:
+            assert both <= losses.keys()
+            with_discriminators.append(step)
+    assert with_discriminators == expected
+
+
+@pytest.mark.parametrize(
+    ("options", "symmetries", "reversals", "sizes"),
+    [
+        ({"symmetries": False}, 1, 1, {32}),
+        ({"symmetries": True}, 8, 1, {32}),
+        ({"symmetries": False, "reversal": True}, 1, 2, {32}),
+        ({"symmetries": False, "scales": [1, 2]}, 1, 1, {32, 16}),
+    ],
+)
+def test_what_the_generator_is_trained_on(
+    source: DatasetSource,
+    monkeypatch: pytest.MonkeyPatch,
+    options: dict[str, Any],
+    symmetries: int,
+    reversals: int,
+    sizes: set[int],
+) -> None:
+    config = TINY.updated({"adversarial_weight": 0, **options})
+    gan, cpu = Gan(config, torch.device("cpu")), torch.device("cpu")
+    run = loop.Run(gan, np.random.default_rng(0), torch.Generator().manual_seed(0))
+    seen: list[tuple[torch.Tensor, ...]] = []
+    original = gan.run
+
+    def record(name: str, *inputs: torch.Tensor, trained: bool = True) -> torch.Tensor:
+        seen.append(inputs)
+        return original(name, *inputs, trained=trained)
+
+    monkeypatch.setattr(gan, "run", record)
+    for step in range(40):
+        loop._step(run, config, source.epoch(0), np.zeros(2, np.int64), cpu, step)
+    assert {inputs[0].shape[-1] for inputs in seen} == sizes
+    whole = [inputs for inputs in seen if inputs[0].shape[-1] == 32]
+    points = {image.numpy().tobytes() for inputs in whole for image in inputs[1]}
+    assert len(points) == symmetries * reversals
+    noise = torch.cat([inputs[2].flatten() for inputs in seen])
+    assert abs(float(noise.mean())) < 0.05
+    assert abs(float(noise.std()) - 1) < 0.05
+
+
+def test_learning_rates_of_an_epoch(source: DatasetSource, monkeypatch: pytest.MonkeyPatch) -> None:
+    config = TINY.updated(
+        {"schedule": "exponential", "decay": 0.5, "plateau_patience": 1, "plateau_factor": 0.1}
+    )
+    gan, cpu = Gan(config, torch.device("cpu")), torch.device("cpu")
+    run = loop.Run(gan, np.random.default_rng(0), torch.Generator().manual_seed(0))
+    run.history = [{"validation": {"iou": iou}} for iou in (0.5, 0.4, 0.3)]
+    factors: list[float] = []
+    monkeypatch.setattr(gan, "set_learning_rates", factors.append)
+    loop._train_epoch(run, config, source.epoch(3), cpu, 3, False)
+    assert factors == pytest.approx([0.1 * 0.5**3] * len(factors))
+    assert factors
+
+
+@pytest.mark.parametrize("decay", [0.0, 0.5])
+def test_the_average_is_validated_and_the_best_epoch_kept(
+    source: DatasetSource, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, decay: float
+) -> None:
+    config = TINY.updated({"ema_decay": decay, "epochs": 3})
+    ious = iter((0.2, 0.3, 0.1))
+    validated: list[dict[str, torch.Tensor]] = []
+
+    def evaluate(generator: torch.nn.Module, *_: Any) -> dict[str, float]:
+        validated.append({k: v.clone() for k, v in generator.state_dict().items()})
+        names = ("dice", "precision", "recall", "connectivity")
+        return {"iou": next(ious, 0.0), **dict.fromkeys(names, 0.0)}
+
+    monkeypatch.setattr(loop, "evaluate", evaluate)
+    run = train(source, config, tmp_path, device="cpu", progress=False)
+    assert run["epoch"] == 2
+    state = load_checkpoint(tmp_path / "last.pt")["gan"]
+    assert equal(validated[2], state["average" if decay else "generator"])
+    assert equal(state["average"], state["generator"]) == (decay == 0)
+
+
+def test_segmentation_alone_trains_exports_and_resumes(
+    source: DatasetSource, tmp_path: Path
+) -> None:
+    config = TINY.updated({"adversarial_weight": 0, "epochs": 1})
+    run = train(source, config, tmp_path / "run", device="cpu", progress=False)
+    longer = config.updated({"epochs": 2})
+    train(source, longer, tmp_path / "run", resume=True, device="cpu", progress=False)
+    state = load_checkpoint(run["checkpoint"])
+    assert "map_discriminator" not in state["gan"]
+    export(run["checkpoint"], tmp_path / "alone.pt")
+    card = " ".join((tmp_path / "alone.md").read_text().split())
+    assert "trained for segmentation alone, without discriminators" in card
 
 
 @pytest.mark.parametrize("name", ["last.pt", "best.pt", "log.jsonl"])

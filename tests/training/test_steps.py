@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 import pytest
 from helpers.tiny_model import TINY
@@ -9,7 +11,7 @@ torch = pytest.importorskip("torch")
 from cbagan_ompl.datasets.dataset import Dataset
 from cbagan_ompl.networks.encoding import region_probability
 from cbagan_ompl.training import losses
-from cbagan_ompl.training.batches import encode, make_batch
+from cbagan_ompl.training.batches import Batch, Images, encode, make_batch
 from cbagan_ompl.training.gan import Gan
 from cbagan_ompl.training.steps import adversarial_weights, discriminator_step, generator_step
 
@@ -17,8 +19,20 @@ CPU = torch.device("cpu")
 NAMES = ("generator", "map_discriminator", "point_discriminator")
 
 
+def network_of(gan: Gan, name: str) -> torch.nn.Module:
+    return gan.generator if name == "generator" else gan.discriminators[name]
+
+
 def weights(gan: Gan) -> dict[str, list[torch.Tensor]]:
-    return {name: [p.detach().clone() for p in getattr(gan, name).parameters()] for name in NAMES}
+    return {
+        name: [p.detach().clone() for p in network_of(gan, name).parameters()] for name in NAMES
+    }
+
+
+def first_step(gan: Gan, dataset: Dataset) -> tuple[Batch, Images, torch.Tensor]:
+    batch = make_batch(dataset.train, np.arange(4), CPU)
+    images = encode(batch)
+    return batch, images, gan.generator(images.map, images.points, torch.randn(batch.free.shape))
 
 
 def changed(before: list[torch.Tensor], after: list[torch.Tensor]) -> bool:
@@ -40,7 +54,44 @@ def test_steps_change_the_weights_that_they_train(dataset: Dataset) -> None:
     assert parts["adversarial"] > 0
     last = weights(gan)
     assert [changed(after[name], last[name]) for name in NAMES] == [True, False, False]
-    assert all(p.requires_grad for p in gan.map_discriminator.parameters())
+    assert all(p.requires_grad for p in network_of(gan, NAMES[1]).parameters())
+
+
+def test_each_discriminator_sees_its_own_condition(dataset: Dataset) -> None:
+    gan = Gan(TINY, CPU)
+    _, images, fake = first_step(gan, dataset)
+    conditions = {"map_discriminator": images.map, "point_discriminator": images.points}
+    expected = {}
+    for name, condition in conditions.items():
+        judge = copy.deepcopy(gan.discriminators[name])
+        real, generated = judge(condition, images.region), judge(condition, fake.detach())
+        expected[name] = losses.discriminator_loss(real, generated).item()
+    assert discriminator_step(gan, images, fake) == pytest.approx(expected, rel=1e-6)
+    assert expected["map_discriminator"] != pytest.approx(expected["point_discriminator"], rel=1e-3)
+
+
+def test_the_generator_descends_the_papers_loss(dataset: Dataset) -> None:
+    factors = {"adversarial_weight": 0.7, "pixel_weight": 3, "bce_weight": 2, "dice_weight": 5}
+    config = TINY.updated(factors)
+    gan = Gan(config, CPU)
+    batch, images, fake = first_step(gan, dataset)
+    judges = copy.deepcopy(gan.discriminators)
+    on_map = losses.adversarial_loss(judges["map_discriminator"](images.map, fake))
+    on_points = losses.adversarial_loss(judges["point_discriminator"](images.points, fake))
+    adversarial = 2 * (0.8 * on_map + 0.2 * on_points)
+    pixel = ((fake - images.region) ** 2).mean()
+    region = region_probability(fake)
+    segmentation = 2 * losses.bce_loss(region, batch.region) + 5 * losses.dice_loss(
+        region, batch.region
+    )
+    loss = 0.7 * adversarial + 3 * pixel + segmentation
+    expected = torch.autograd.grad(loss, list(gan.generator.parameters()), retain_graph=True)
+    parts = generator_step(gan, config, batch, images, fake, (0.8, 0.2))
+    assert parts["adversarial"] == pytest.approx(adversarial.item(), rel=1e-6)
+    assert parts["pixel"] == pytest.approx(pixel.item(), rel=1e-6)
+    assert on_map.item() != pytest.approx(on_points.item(), rel=1e-3)
+    for gradient, parameter in zip(expected, gan.generator.parameters(), strict=True):
+        torch.testing.assert_close(parameter.grad, gradient)
 
 
 def test_the_discriminators_reach_the_generator(dataset: Dataset) -> None:

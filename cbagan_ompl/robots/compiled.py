@@ -1,0 +1,265 @@
+"""Straight motions of a shape, compiled by numba: the same answers as in Python, many times sooner.
+
+The algorithm is that of :mod:`.shape_checker`, which explains it and takes this one where numba is
+installed; the tests hold the two together.
+"""
+
+from __future__ import annotations
+
+from math import cos, inf, pi, sin
+from typing import Any
+
+from numba import njit
+
+from .clearance_tables import BLOCKED, CLEAR, STEP, UNKNOWN
+
+TURN = 2 * pi
+
+# Given, so that whole numbers among the coordinates lead to no second compilation.
+_SIGNATURE = (
+    "int64(float64, float64, float64, float64, float64, float64, uint8[:, ::1], int64[::1],"
+    "uint16[:, ::1], float64[:, ::1], int64[::1], float64[:, ::1])"
+)
+
+# Most parts of a motion that are left to the exact test one by one; beyond that all of it is.
+_MOST_GAPS = 32
+
+
+@njit(cache=True)
+def _note(scratch: Any, gaps: int, low: float, high: float) -> None:
+    if gaps < _MOST_GAPS:
+        scratch[0, gaps] = low
+        scratch[1, gaps] = high
+    else:
+        # The last one takes in what follows.
+        scratch[1, _MOST_GAPS - 1] = high
+
+
+@njit(cache=True)
+def _region_is_free(  # noqa: C901 - one loop on purpose
+    xs: Any, ys: Any, count: int, margin: float, runs: Any, scratch: Any
+) -> bool:
+    height, width = runs.shape
+    top, bottom = ys[0], ys[count - 1]
+    if not (top - margin >= 0 and bottom + margin < height):
+        return False
+    first, last = int(top - margin), int(bottom + margin)
+    lefts, rights = scratch[4], scratch[5]
+    for row in range(last - first + 1):
+        lefts[row], rights[row] = inf, -inf
+    chain_x, chain_y = scratch[6], scratch[7]
+    for side in (-1.0, 1.0):
+        length = 0
+        for point in range(count):
+            x, y = xs[point], ys[point]
+            while length > 1:
+                ax, ay = chain_x[length - 2], chain_y[length - 2]
+                bx, by = chain_x[length - 1], chain_y[length - 1]
+                if side * ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) > 0:
+                    break
+                length -= 1
+            chain_x[length], chain_y[length] = x, y
+            length += 1
+        for corner in range(max(length - 1, 1)):
+            after = min(corner + 1, length - 1)
+            u0, v0, u1, v1 = chain_x[corner], chain_y[corner], chain_x[after], chain_y[after]
+            slope = (u1 - u0) / (v1 - v0) if v1 > v0 else 0.0
+            for row in range(int(v0 - margin), int(v1 + margin) + 1):
+                upper, lower = row - margin, row + 1 + margin
+                a = u0 + (upper - v0) * slope if upper > v0 else u0
+                b = u0 + (lower - v0) * slope if lower < v1 else u1
+                lefts[row - first] = min(lefts[row - first], a, b)
+                rights[row - first] = max(rights[row - first], a, b)
+    for row in range(first, last + 1):
+        left, right = lefts[row - first] - margin, rights[row - first] + margin
+        if not (left >= 0 and right < width):
+            return False
+        column = int(left)
+        if runs[row, column] <= int(right) - column:
+            return False
+    return True
+
+
+@njit(cache=True)
+def _swept_is_free(
+    motion: Any,
+    low: float,
+    high: float,
+    margin: float,
+    runs: Any,
+    parts: Any,
+    starts: Any,
+    scratch: Any,
+) -> bool:
+    u, v, heading, du, dv, turn = motion
+    xs, ys = scratch[2], scratch[3]
+    for part in range(len(starts) - 1):
+        count = 0
+        for t in (low, high):
+            c, s = cos(heading + t * turn), sin(heading + t * turn)
+            for index in range(starts[part], starts[part + 1]):
+                x, y = parts[index, 0], parts[index, 1]
+                new_x, new_y = u + t * du + c * x - s * y, v + t * dv + s * x + c * y
+                # Sorted by row, then column.
+                place = count
+                while place > 0 and (
+                    ys[place - 1] > new_y or (ys[place - 1] == new_y and xs[place - 1] > new_x)
+                ):
+                    xs[place], ys[place] = xs[place - 1], ys[place - 1]
+                    place -= 1
+                xs[place], ys[place] = new_x, new_y
+                count += 1
+        if not _region_is_free(xs, ys, count, margin, runs, scratch):
+            return False
+    return True
+
+
+@njit(cache=True)
+def _excess(radius: float, diameter: float, angle: float) -> float:
+    return diameter * angle / 4 + 3 * radius * angle * angle / 6
+
+
+@njit(cache=True)
+def _gap_is_free(
+    motion: Any,
+    low: float,
+    high: float,
+    runs: Any,
+    parts: Any,
+    starts: Any,
+    scratch: Any,
+    constants: Any,
+) -> bool:
+    radius, diameter, worth_a_test = constants[0], constants[1], constants[4]
+    conservatism, rounding = constants[5], constants[6]
+    turn = abs(motion[5])
+    at, width = low, 1.0
+    while width / 2 >= high - low and _excess(radius, diameter, turn * width) > conservatism:
+        width /= 2
+    while at < high:
+        excess, index = _excess(radius, diameter, turn * width), at // width
+        margin = radius * (turn * width) ** 2 / 6 + rounding
+        start, end = index * width, (index + 1) * width
+        if excess <= worth_a_test and _swept_is_free(
+            motion, start, end, margin, runs, parts, starts, scratch
+        ):
+            at = end
+            if index % 2 and width < 1:
+                width *= 2
+        elif excess <= conservatism:
+            return False
+        else:
+            width /= 2
+    return True
+
+
+@njit(cache=True)
+def _motion_is_free(  # noqa: C901 - one loop on purpose
+    motion: Any,
+    tables: Any,
+    counts: Any,
+    runs: Any,
+    parts: Any,
+    starts: Any,
+    scratch: Any,
+    constants: Any,
+) -> int:
+    u, v, heading, du, dv, turn = motion
+    height, width = runs.shape
+    ranges = len(counts) // 5
+    wanted = gaps = 0
+    movement = (du * du + dv * dv) ** 0.5 + constants[0] * abs(turn)
+    per_value, look = 2.0, 2.0
+    if movement > 0:
+        per_value, look = STEP / movement, constants[3] / movement
+    done, end, t = 0.0, 1.0, 1.0
+    while True:
+        at_u, at_v, at = u + t * du, v + t * dv, heading + t * turn
+        if not (0 <= at_u < width and 0 <= at_v < height and at >= 0):
+            return wanted
+        index = int(at * constants[2])
+        value = int(tables[counts[index], int(at_v) * width + int(at_u)])
+        if value == BLOCKED:
+            return wanted
+        if value == UNKNOWN:
+            index %= ranges
+            counts[4 * ranges + index] += 1
+            if counts[4 * ranges + index] == constants[7]:
+                wanted = 2 * index + 2
+        reach = (value - CLEAR) * per_value
+        if t == 1.0:
+            end, t = (1.0 - reach if value > CLEAR else 1.0), 0.0
+            continue
+        if value > CLEAR:
+            if t - reach > done:
+                _note(scratch, gaps, done, t - reach)
+                gaps += 1
+            t += reach
+            done = t
+        else:
+            t += look
+        if t >= end:
+            break
+    if done < end:
+        _note(scratch, gaps, done, end)
+        gaps += 1
+    for gap in range(min(gaps, _MOST_GAPS)):
+        low, high = scratch[0, gap], scratch[1, gap]
+        if not _gap_is_free(motion, low, high, runs, parts, starts, scratch, constants):
+            return wanted
+    return wanted + 1
+
+
+@njit(_SIGNATURE, cache=True)
+def straight_is_free(
+    x0: float,
+    y0: float,
+    yaw0: float,
+    x1: float,
+    y1: float,
+    yaw1: float,
+    tables: Any,
+    counts: Any,
+    runs: Any,
+    parts: Any,
+    starts: Any,
+    scratch: Any,
+) -> int:
+    """Return whether a straight motion touches nothing, and which table would have helped.
+
+    Args:
+        x0: where it begins, world.
+        y0: where it begins, world.
+        yaw0: where it begins, radians.
+        x1: where it ends, world.
+        y1: where it ends, world.
+        yaw1: where it ends, radians.
+        tables: (K, H * W), the tables that are made.
+        counts: for each range of headings in four full turns which table is its own, then for each
+            range how often its table did not know; counted here.
+        runs: (H, W), free pixels to the right of each, itself included.
+        parts: (N, 2), the vertices of all convex parts.
+        starts: where in ``parts`` each part begins, and the end.
+        scratch: (9, M), M at least 32, twice the vertices of a part and the rows of the map. The
+            last row holds, as from ``ShapeChecker``: radius, diameter, ranges per radian, least
+            step, worth a test, conservatism, rounding, after how many uses a table is wanted,
+            whether the shape turns, sign and phase of headings, and the six numbers from world to
+            pixels.
+
+    Returns:
+        1 or 0, plus twice the index from 1 on of the range of headings whose table is wanted.
+    """
+    constants = scratch[8]
+    a, b, c = constants[11], constants[12], constants[13]
+    d, e, f = constants[14], constants[15], constants[16]
+    u, v = a * x0 + b * y0 + c, d * x0 + e * y0 + f
+    du, dv = a * (x1 - x0) + b * (y1 - y0), d * (x1 - x0) + e * (y1 - y0)
+    heading, turn = 0.0, 0.0
+    if constants[8] != 0.0:
+        heading = (constants[9] * yaw0 + constants[10]) % TURN + TURN
+        turn = yaw1 - yaw0
+        if not -pi <= turn <= pi:
+            turn = (turn + pi) % TURN - pi
+        turn *= constants[9]
+    motion = (u, v, heading, du, dv, turn)
+    return _motion_is_free(motion, tables, counts, runs, parts, starts, scratch, constants)
