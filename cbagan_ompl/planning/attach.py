@@ -10,7 +10,7 @@ from typing import Any
 
 from ..errors import PlannerError
 from ..sampling.adaptation import AdaptiveMixture
-from ..sampling.budget import EARNED_BY_UNIFORM_UNSEEN, LearnedBudget
+from ..sampling.budget import ADVANCE_WITH_TREE, EARNED_BY_UNIFORM_UNSEEN, LearnedBudget
 from ..sampling.checks import check_heatmap
 from ..sampling.headings import HeadingSampler
 from ..sampling.heatmap import Heatmap
@@ -203,7 +203,7 @@ def attach(
     headings = HeadingSampler(heatmap, options.heading, rng, drives_backwards(space))
     states = state_access(space, headings)
     monitor = _MONITORS.get(hook, PlannerMonitor)(setup, states)
-    budget = _budget_of(planner, name) if options.adaptation.stagnation else None
+    budget = _budget_of(planner, name, hook) if options.adaptation.stagnation else None
     mixture: AdaptiveMixture | RoadmapMixture | None = None
     if hook in _MONITORS:  # callbacks see the tree
         reach = _reach_of(planner)
@@ -238,7 +238,9 @@ def _reach_of(planner: Any) -> float:
     return _REACH * float(range or _OMPL_RANGE * si.getMaximumExtent())
 
 
-def _budget_of(planner: Any, name: str) -> LearnedBudget:
+def _budget_of(planner: Any, name: str, hook: str) -> LearnedBudget:
+    if hook in _MONITORS:
+        return LearnedBudget(advance=ADVANCE_WITH_TREE)
     if stops_at_first(name) or hasattr(planner, "bestCost"):
         return LearnedBudget()
     return LearnedBudget(EARNED_BY_UNIFORM_UNSEEN, is_halved=False)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-#: Learned samples that are given in advance.
+#: Learned samples that are given in advance where no nodes are seen, which would earn more.
 ADVANCE = 128
+#: The same where nodes are seen.
+ADVANCE_WITH_TREE = 32
 #: Learned samples that a uniform sample earns, where the planner stops at its first path or tells
 #: what its path costs.
 EARNED_BY_UNIFORM = 0.25
@@ -19,11 +21,12 @@ class LearnedBudget:
 
     Each learned sample costs one. Uniform samples, and nodes in new parts of the region, earn some
     back, up to the advance. So after ``U`` uniform samples and ``N`` such nodes there were at most
-    ``ADVANCE + earned_by_uniform * U + EARNED_BY_NODE * N`` learned ones, whatever the heat map.
+    ``advance + earned_by_uniform * U + EARNED_BY_NODE * N`` learned ones, whatever the heat map.
 
     Args:
         earned_by_uniform: learned samples that a uniform sample earns.
         is_halved: whether that halves when learned samples have done what they can.
+        advance: learned samples that are given in advance, and the most that can be saved up.
 
     Example:
         >>> budget = LearnedBudget()
@@ -36,11 +39,15 @@ class LearnedBudget:
     """
 
     def __init__(
-        self, earned_by_uniform: float = EARNED_BY_UNIFORM, is_halved: bool = True
+        self,
+        earned_by_uniform: float = EARNED_BY_UNIFORM,
+        is_halved: bool = True,
+        advance: int = ADVANCE,
     ) -> None:
         self._earned_at_first = self._earned_by_uniform = earned_by_uniform
         self._is_halved = is_halved
-        self._left: float = ADVANCE
+        self._advance = advance
+        self._left: float = advance
 
     def spend(self) -> bool:
         """Return whether a learned sample may be had, which then is paid."""
@@ -51,11 +58,11 @@ class LearnedBudget:
 
     def earn_by_uniform(self) -> None:
         """Note a uniform sample."""
-        self._left = min(self._left + self._earned_by_uniform, ADVANCE)
+        self._left = min(self._left + self._earned_by_uniform, self._advance)
 
     def earn_by_node(self) -> None:
         """Note a node in a new part of the region."""
-        self._left = min(self._left + EARNED_BY_NODE, ADVANCE)
+        self._left = min(self._left + EARNED_BY_NODE, self._advance)
 
     def use_up(self) -> None:
         """Note that learned samples have done what they can: more are to be earned."""
@@ -65,5 +72,5 @@ class LearnedBudget:
 
     def restart(self) -> None:
         """Note that the planner begins anew."""
-        self._left = ADVANCE
+        self._left = self._advance
         self._earned_by_uniform = self._earned_at_first

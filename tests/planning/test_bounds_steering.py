@@ -39,6 +39,10 @@ def new_setup(grid: GridMap, planner: str = "RRTConnect", range: float = 20.0) -
     return setup
 
 
+def positions(setup: Any) -> np.ndarray:
+    return np.array([(state[0], state[1]) for state in setup.getSolutionPath().getStates()])
+
+
 def is_as_before(setup: Any, grid: GridMap, range: float = 20.0) -> bool:
     bounds = setup.getStateSpace().getBounds()
     low, high = grid.bounds
@@ -201,7 +205,7 @@ def test_solve_goes_on_and_begins_anew(two_walls: GridMap, corridor: Heatmap) ->
         assert compat.is_exact(setup.solve(2.0))
         assert attachment.sample_counts["learned"] > seen
         setup.simplifySolution()
-        path = compat.path_positions(setup.getSolutionPath())
+        path = positions(setup)
         assert two_walls.path_is_free(path)
         assert np.hypot(*(path[-1] - GOAL)) <= 2.0
 
@@ -318,7 +322,7 @@ def test_a_goal_with_many_states(two_walls: GridMap, corridor: Heatmap) -> None:
         with attach(setup, corridor, seed=seed) as attachment:
             assert compat.is_exact(setup.solve(5.0))
             assert attachment.sample_counts["learned"] > 5
-            end = compat.path_positions(setup.getSolutionPath())[-1]
+            end = positions(setup)[-1]
             assert np.hypot(*(end - GOAL)) <= 5.0
 
 

@@ -176,6 +176,35 @@ def test_wrong_heat_maps_cost_little(two_walls: GridMap, corridor: Heatmap, kind
         assert iterations(heatmap=wrong, adaptation=NO_ADAPTATION) > 2 * plain
 
 
+def tunnel() -> Heatmap:
+    """A region that leads through a winding tunnel one pixel wide, beside a wide gap."""
+    free = np.ones((256, 256), bool)
+    free[:, 98:158] = False
+    free[200:240, 98:158] = True
+    region = np.zeros(free.shape, bool)
+    region[60, 20:98] = region[60:81, 157] = region[60, 157:231] = True
+    for turn, column in enumerate(range(98, 158, 4)):
+        region[60:81, column] = True
+        region[60 if turn % 2 else 80, column : min(column + 5, 158)] = True
+    return Heatmap(region.astype(np.float32), GridMap(free | region))
+
+
+def test_a_tunnel_that_leads_to_the_goal_costs_little() -> None:
+    heatmap = tunnel()
+    start, goal = (20.5, 60.5), (230.5, 60.5)
+    assert heatmap.connects(start, goal)
+
+    def iterations(**options: object) -> float:
+        runs = [
+            plan(heatmap.grid, start, goal, "RRT", range=20, time=20, seed=seed, **options)
+            for seed in range(25)
+        ]
+        assert all(run.solved for run in runs)
+        return float(np.median([run.iterations for run in runs]))
+
+    assert iterations(heatmap=heatmap) < 1.5 * iterations(sampler="uniform")
+
+
 def test_coverage_saves_nodes(two_walls: GridMap, corridor: Heatmap) -> None:
     def nodes(adaptation: Adaptation) -> float:
         runs = [
