@@ -195,7 +195,7 @@ def test_snap_moves_a_pose_to_where_it_fits(open_space: GridMap) -> None:
     assert result.snapped["start"]["given"] == [50, 94, np.pi / 2]
     assert 0 < result.snapped["start"]["distance"] < 2
     assert result.start[2] == np.pi / 2
-    with pytest.raises(TaskError, match="nothing within 0.2"):
+    with pytest.raises(TaskError, match=r"nothing within 0\.2"):
         plan(open_space, (50, 94, np.pi / 2), GOAL, robot=robot, snap=0.2, sampler="uniform")
 
 
