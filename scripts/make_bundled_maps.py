@@ -38,8 +38,8 @@ _AHEAD = 15.0
 SLOT, LANE, WALL, TAKEN = (6, 11), 15, 3, 0.8
 ROWS, COLUMNS = 8, 41
 
-# Start and goal pixels, chosen by eye; in the parking lot free slots. The first of a map is the most
-# instructive one.
+# Start and goal pixels, chosen by eye; in the parking lot free slots. The first of a map is the
+# most instructive one.
 TASKS = {
     # Out of the trap to what lies behind it; into it; past it; out of it, to the mouth's own side.
     "bug_trap": [

@@ -152,7 +152,7 @@ def test_table_of_hooks() -> None:
         hook = row[column].replace(" sampler", "-sampler").replace(" ", "-")
         for name in row[0].split(", "):
             hooks[name.replace("*", "star").replace(" ", "")] = hook
-    reached = {n: h for n, h in hooks.items() if h.endswith(("sampler", "injection"))}
+    reached = {n: h for n, h in hooks.items() if h.endswith(("sampler", "injection", "steering"))}
     assert reached == reached_planners()
 
 

@@ -238,6 +238,8 @@ class BoundsSteering:
     def _steer(self, caller: FrameType) -> None:
         """Make the next sample one of ours."""
         monitor, sampler = self._monitor, self._sampler
+        if monitor.is_released:
+            return  # detached in the middle of a solve, by one of its callbacks
         fraction = monitor.injected_fraction
         if fraction < 1 and sampler.chance() >= fraction:
             return

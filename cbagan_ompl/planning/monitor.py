@@ -174,6 +174,11 @@ class PlannerMonitor:
     def _watch_references(self, target: Any) -> int:
         return sum(watch.references_to(target) for watch in self._watches)
 
+    @property
+    def is_released(self) -> bool:
+        """Whether the planner was let go of."""
+        return self._planner is None
+
     def release(self) -> None:
         """Let go of the planner and its task."""
         for watch in self._watches:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, sin
+from math import cos, pi, remainder, sin, tau
 
 import cv2
 import numpy as np
@@ -45,7 +45,7 @@ def position_map(grid: GridMap, robot: Robot) -> GridMap:
 
 
 def check_pose(role: str, pose: ArrayLike) -> NDArray[np.float64]:
-    """Return a pose as an array (3,).
+    """Return a pose as an array (3,), its yaw in [-pi, pi).
 
     Args:
         role: "start" or "goal", for messages.
@@ -68,7 +68,10 @@ def check_pose(role: str, pose: ArrayLike) -> NDArray[np.float64]:
             f"{role} must be three finite numbers x, y, yaw, in world units and radians, got "
             f"{show(pose)}"
         )
-    return np.array([float(value) for value in values])
+    x, y, yaw = (float(value) for value in values)
+    # OMPL's headings lie in [-pi, pi): it calls a state with another one invalid.
+    wrapped = remainder(yaw, tau)
+    return np.array([x, y, -pi if wrapped >= pi else wrapped])
 
 
 def check_poses(checker: ShapeChecker, start: ArrayLike, goal: ArrayLike) -> Poses:

@@ -8,7 +8,7 @@ ADVANCE = 128
 ADVANCE_WITH_TREE = 32
 #: Learned samples that a uniform sample earns, where the planner stops at its first path or tells
 #: what its path costs.
-EARNED_BY_UNIFORM = 0.25
+EARNED_BY_UNIFORM = 0.5
 #: The same for planners of which it is not known when they have a path: half of their samples
 #: stay learned, since a good heat map also shortens a path.
 EARNED_BY_UNIFORM_UNSEEN = 1.0
@@ -32,7 +32,7 @@ class LearnedBudget:
         >>> budget = LearnedBudget()
         >>> sum(budget.spend() for _ in range(1000))
         128
-        >>> for _ in range(8):
+        >>> for _ in range(4):
         ...     budget.earn_by_uniform()
         >>> budget.spend(), budget.spend(), budget.spend()
         (True, True, False)

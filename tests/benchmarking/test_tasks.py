@@ -21,7 +21,7 @@ def image(two_walls: GridMap, tmp_path: Path) -> str:
 
 def test_bundled_maps_and_their_tasks_are_the_default() -> None:
     tasks = select_tasks([])
-    assert len(tasks) == 28
+    assert len(tasks) == 32
     assert tasks[0].name == "bug_trap_0"
     assert [task.name for task in select_tasks(["bundled:maze"], tasks_per_map=2)] == [
         "maze_0",

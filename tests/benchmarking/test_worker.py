@@ -58,7 +58,7 @@ def test_only_the_other_samplers_have_heat_maps(finished: Finished) -> None:
                     assert samples == (0, 0)
                     assert float(run["inference time REAL"]) == 0
                 else:
-                    assert samples[0] > samples[1] > 0
+                    assert samples[0] > samples[1] / 3 > 0
                     assert float(run["inference time REAL"]) > 0
 
 

@@ -153,5 +153,5 @@ def test_without_torch_the_message_says_what_to_install(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setitem(sys.modules, "torch", None)
-    with pytest.raises(MissingDependencyError, match=r"pip install 'cbagan-ompl\[torch\]'"):
+    with pytest.raises(MissingDependencyError, match=r"pip install -e '.\[torch\]'"):
         load_model()

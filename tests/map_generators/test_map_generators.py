@@ -146,8 +146,10 @@ def test_generators_raise_for_small_maps(generator):
 
 
 def test_bundled_maps_are_what_the_script_generates(script):
-    assert set(bundled_maps()) == set(script.TASKS) < set(MAP_GENERATORS)
+    assert set(bundled_maps()) == set(script.TASKS) <= {*MAP_GENERATORS, "parking"}
     for name in bundled_maps():
         np.testing.assert_array_equal(GridMap.load(f"bundled:{name}").free, script.draw(name))
     shipped = (bundled_folder() / "tasks.csv").read_text(encoding="utf-8")
     assert shipped == script.tasks_csv()
+    poses = (bundled_folder() / "car_tasks.csv").read_text(encoding="utf-8")
+    assert poses == script.car_tasks_csv()

@@ -209,3 +209,13 @@ def test_replanner_keeps_the_heat_map_of_a_robot(open_space: GridMap) -> None:
     second = replanner.plan(first.path[1])
     assert (first.heatmap_kept, second.heatmap_kept) == (False, True)
     check(second, open_space, robot)
+
+
+@pytest.mark.parametrize("yaw", [np.pi, -np.pi, 3 * np.pi, 7.0])
+def test_any_yaw_is_one_that_ompl_takes(open_space: GridMap, yaw: float) -> None:
+    robot = ROBOTS["SE(2)"]
+    start, goal = (200.0, 30.0, yaw), (60.0, 30.0, yaw)
+    result = plan(open_space, start, goal, "RRT", "corridor", robot=robot, time=20, seed=0)
+    check(result, open_space, robot)
+    assert -np.pi <= result.start[2] < np.pi
+    assert abs(np.exp(1j * result.start[2]) - np.exp(1j * yaw)) < 1e-9

@@ -66,7 +66,7 @@ def test_the_description_of_a_source_can_be_written() -> None:
 def test_synthetic_maps_need_numba(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "numba", None)
     with (
-        pytest.raises(MissingDependencyError, match=r"numba.*pip install 'cbagan-ompl\[train\]'"),
+        pytest.raises(MissingDependencyError, match=r"numba.*pip install -e '.\[train\]'"),
         synthetic_source(SMALL, FEW),
     ):
         pass

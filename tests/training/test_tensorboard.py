@@ -18,7 +18,7 @@ def test_tensorboard_is_optional(
     source: DatasetSource, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", None)
-    with pytest.raises(MissingDependencyError, match=r"cbagan-ompl\[tensorboard\]"):
+    with pytest.raises(MissingDependencyError, match=r"pip install -e '.\[tensorboard\]'"):
         train(source, TINY, tmp_path, device="cpu", progress=False, tensorboard=True)
 
 
