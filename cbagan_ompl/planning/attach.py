@@ -10,7 +10,12 @@ from typing import Any
 
 from ..errors import PlannerError
 from ..sampling.adaptation import AdaptiveMixture
-from ..sampling.budget import ADVANCE_WITH_TREE, EARNED_BY_UNIFORM_UNSEEN, LearnedBudget
+from ..sampling.budget import (
+    ADVANCE_WITH_TREE,
+    EARNED_BY_UNIFORM_IN_ROADMAP,
+    EARNED_BY_UNIFORM_UNSEEN,
+    LearnedBudget,
+)
 from ..sampling.checks import check_heatmap
 from ..sampling.headings import HeadingSampler
 from ..sampling.heatmap import Heatmap
@@ -241,6 +246,8 @@ def _reach_of(planner: Any) -> float:
 def _budget_of(planner: Any, name: str, hook: str) -> LearnedBudget:
     if hook in _MONITORS:
         return LearnedBudget(advance=ADVANCE_WITH_TREE)
+    if samples_are_nodes(name) and stops_at_first(name):
+        return LearnedBudget(EARNED_BY_UNIFORM_IN_ROADMAP)
     if stops_at_first(name) or hasattr(planner, "bestCost"):
         return LearnedBudget()
     return LearnedBudget(EARNED_BY_UNIFORM_UNSEEN, is_halved=False)

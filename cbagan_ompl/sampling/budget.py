@@ -9,6 +9,8 @@ ADVANCE_WITH_TREE = 32
 #: Learned samples that a uniform sample earns, where the planner stops at its first path or tells
 #: what its path costs.
 EARNED_BY_UNIFORM = 0.5
+#: The same for roadmaps, whose samples are their nodes: a crowd of them costs more than its share.
+EARNED_BY_UNIFORM_IN_ROADMAP = 0.25
 #: The same for planners of which it is not known when they have a path: half of their samples
 #: stay learned, since a good heat map also shortens a path.
 EARNED_BY_UNIFORM_UNSEEN = 1.0
