@@ -12,8 +12,8 @@ from ..errors import PlannerError
 from ..sampling.adaptation import AdaptiveMixture
 from ..sampling.budget import (
     ADVANCE_WITH_TREE,
-    EARNED_BY_UNIFORM_IN_ROADMAP,
     EARNED_BY_UNIFORM_UNSEEN,
+    EARNED_BY_UNIFORM_WITH_TREE,
     LearnedBudget,
 )
 from ..sampling.checks import check_heatmap
@@ -245,9 +245,7 @@ def _reach_of(planner: Any) -> float:
 
 def _budget_of(planner: Any, name: str, hook: str) -> LearnedBudget:
     if hook in _MONITORS:
-        return LearnedBudget(advance=ADVANCE_WITH_TREE)
-    if samples_are_nodes(name) and stops_at_first(name):
-        return LearnedBudget(EARNED_BY_UNIFORM_IN_ROADMAP)
+        return LearnedBudget(EARNED_BY_UNIFORM_WITH_TREE, advance=ADVANCE_WITH_TREE)
     if stops_at_first(name) or hasattr(planner, "bestCost"):
         return LearnedBudget()
     return LearnedBudget(EARNED_BY_UNIFORM_UNSEEN, is_halved=False)

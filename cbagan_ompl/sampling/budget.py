@@ -8,9 +8,9 @@ ADVANCE = 128
 ADVANCE_WITH_TREE = 32
 #: Learned samples that a uniform sample earns, where the planner stops at its first path or tells
 #: what its path costs.
-EARNED_BY_UNIFORM = 0.5
-#: The same for roadmaps, whose samples are their nodes: a crowd of them costs more than its share.
-EARNED_BY_UNIFORM_IN_ROADMAP = 0.25
+EARNED_BY_UNIFORM = 0.25
+#: The same where nodes are seen.
+EARNED_BY_UNIFORM_WITH_TREE = 0.5
 #: The same for planners of which it is not known when they have a path: half of their samples
 #: stay learned, since a good heat map also shortens a path.
 EARNED_BY_UNIFORM_UNSEEN = 1.0
@@ -34,7 +34,7 @@ class LearnedBudget:
         >>> budget = LearnedBudget()
         >>> sum(budget.spend() for _ in range(1000))
         128
-        >>> for _ in range(4):
+        >>> for _ in range(8):
         ...     budget.earn_by_uniform()
         >>> budget.spend(), budget.spend(), budget.spend()
         (True, True, False)

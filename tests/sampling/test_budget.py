@@ -12,7 +12,7 @@ from cbagan_ompl.sampling.sampler import HeatmapSampler
 def test_the_bound_holds_in_any_order() -> None:
     rng = np.random.default_rng(0)
     for _ in range(20):
-        budget = LearnedBudget(0.5)
+        budget = LearnedBudget(0.25)
         learned = uniform = nodes = 0
         weights = rng.dirichlet(np.ones(3))
         for what in rng.choice(3, 3000, p=weights):
@@ -24,17 +24,17 @@ def test_the_bound_holds_in_any_order() -> None:
             else:
                 budget.earn_by_node()
                 nodes += 1
-            assert learned <= ADVANCE + 0.5 * uniform + EARNED_BY_NODE * nodes
+            assert learned <= ADVANCE + 0.25 * uniform + EARNED_BY_NODE * nodes
 
 
 def test_samples_of_a_sampler_with_a_budget(two_walls: GridMap, corridor: Heatmap) -> None:
-    """Asked in vain, a sampler ends with one learned sample in three, until it is restarted."""
+    """Asked in vain, a sampler ends with one learned sample in five, until it is restarted."""
     sampler = HeatmapSampler(corridor, seed=0, budget=LearnedBudget())
     for _ in range(5000):
         sampler.next()
     counts = sampler.sample_counts
-    assert counts["learned"] <= ADVANCE + 0.5 * counts["uniform"]
-    assert counts["learned"] > 1500
+    assert counts["learned"] <= ADVANCE + 0.25 * counts["uniform"]
+    assert counts["learned"] > 900
     sampler.restart()
     for _ in range(100):
         sampler.next()
@@ -47,7 +47,7 @@ def test_local_samples_are_bounded_too(corridor: Heatmap, distance: float) -> No
     for _ in range(3000):
         sampler.near(20.0, 20.0, distance)
     counts = sampler.sample_counts
-    assert counts["learned"] <= ADVANCE + 0.5 * counts["uniform"]
+    assert counts["learned"] <= ADVANCE + 0.25 * counts["uniform"]
     assert sum(counts.values()) == 3000
 
 
