@@ -161,7 +161,7 @@ def _draw_map(axes: Axes, result: PlanResult, grid: GridMap) -> list[Patch]:
     if result.heatmap is not None:
         inflated = grid.free & ~result.heatmap.grid.free
     for mask, color, label in (
-        (inflated, _INFLATED, "inflated by the radius"),
+        (inflated, _INFLATED, "too near for the robot"),
         (~grid.free & ~unknown, OBSTACLE, "obstacle"),
         (~grid.free & unknown, UNKNOWN, "unknown"),
     ):
@@ -207,12 +207,12 @@ def _draw_poses(axes: Axes, result: PlanResult, grid: GridMap) -> list[Artist]:
         return []
     outlines = [grid.to_pixel(result.robot.outline(pose)) for pose in poses]
     axes.add_collection(
-        PolyCollection(outlines, facecolors="none", edgecolors=BLACK, linewidths=0.7, alpha=0.7)
+        PolyCollection(outlines, facecolors="none", edgecolors=BLACK, linewidths=0.9, zorder=3)
     )
     # The front of a robot is where its heading points.
     noses = poses[:, :2] + result.robot.circumscribed_radius * _directions(poses)
     lines = np.stack((grid.to_pixel(poses[:, :2]), grid.to_pixel(noses)), axis=1)
-    axes.add_collection(LineCollection(list(lines), colors=BLACK, linewidths=0.7, alpha=0.7))
+    axes.add_collection(LineCollection(list(lines), colors=BLACK, linewidths=0.9, zorder=3))
     return [Patch(facecolor="none", edgecolor=BLACK, label="footprint")]
 
 

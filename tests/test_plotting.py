@@ -30,7 +30,7 @@ def test_everything_is_drawn(two_walls: GridMap) -> None:
     )
     figure = make_figure(result, two_walls)
     assert legend(figure) == {
-        "heat map (corridor)", "obstacle", "inflated by the radius", "tree", "path", "start", "goal"
+        "heat map (corridor)", "obstacle", "too near for the robot", "tree", "path", "start", "goal"
     }  # fmt: skip
     titles = " ".join(text.get_text() for text in figure.texts)
     assert f"{result.cost:.4g}" in titles

@@ -16,6 +16,8 @@ from ..maps.checks import check_grid
 from ..maps.grid_map import GridMap
 from ..maps.grid_search import prepare_search
 from ..networks.config import MAX_IMAGE_SIZE
+from ..robots.poses import map_and_position, position_map
+from ..robots.robot import Robot
 from ..sampling.heatmap import Heatmap
 from .bundled_models import find_model
 from .model_files import load_script, read_model
@@ -133,24 +135,31 @@ class Predictor:
             raise ModelError("the model gives no image of probabilities, it is probably damaged")
 
     def predict(
-        self, grid: GridMap, start: ArrayLike, goal: ArrayLike, repair: bool = True
+        self,
+        grid: GridMap,
+        start: ArrayLike,
+        goal: ArrayLike,
+        repair: bool = True,
+        robot: Robot | None = None,
     ) -> Heatmap:
         """Predict where good paths probably run.
 
         Args:
             grid: the map, of any size. For the network its longer side is scaled to the model's
                 ``working_size`` (small maps to twice their size), and the result back again.
-            start: (x, y), world.
-            goal: (x, y), world.
+            start: (x, y), world, or a pose for a robot with heading.
+            goal: the same.
             repair: connect the parts of the region where it does not connect start and goal, see
                 :meth:`Heatmap.connected`; without it the heat map is the network's output.
+            robot: what moves; the heat map lies on the map of its positions. None for a point.
 
         Raises:
+            RobotError: ``robot`` is no robot.
             MapError: ``grid`` is no :class:`GridMap`.
             TaskError: see :meth:`GridMap.check_task`.
             ConfigError: ``repair`` is no truth value.
         """
-        return self._predict(grid, [start], [goal], repair)[0]
+        return self.predict_many(grid, [start], [goal], repair, robot)[0]
 
     def predict_many(
         self,
@@ -158,20 +167,23 @@ class Predictor:
         starts: Iterable[ArrayLike],
         goals: Iterable[ArrayLike],
         repair: bool = True,
+        robot: Robot | None = None,
     ) -> list[Heatmap]:
         """Predict for several tasks on one map, in passes of several tasks each.
 
         Args:
             grid: the map.
-            starts: (x, y) of each task, world.
-            goals: (x, y) of each task, world.
+            starts: (x, y) of each task, world, or poses for a robot with heading.
+            goals: the same.
             repair: see :meth:`predict`.
+            robot: see there.
 
         Returns:
             The heat map of each task.
 
         Raises:
             MapError: ``grid`` is no :class:`GridMap`.
+            RobotError: ``robot`` is no robot.
             TaskError: starts and goals are not as many, or see :meth:`GridMap.check_task`.
             ConfigError: ``repair`` is no truth value.
 
@@ -182,9 +194,13 @@ class Predictor:
             >>> len(load_model().predict_many(grid, [(20, 20)] * 2, goals))
             2
         """
+        check_grid(grid)
         starts, goals = _list_points("starts", starts), _list_points("goals", goals)
         if len(starts) != len(goals):
             raise TaskError(f"each task has a start and a goal, got {len(starts)} and {len(goals)}")
+        starts = [map_and_position(grid, robot, "start", start)[1] for start in starts]
+        goals = [map_and_position(grid, robot, "goal", goal)[1] for goal in goals]
+        grid = grid if robot is None else position_map(grid, robot)
         return [
             heatmap
             for i in range(0, len(starts), _BATCH)
@@ -197,7 +213,6 @@ class Predictor:
         self, grid: GridMap, starts: list[ArrayLike], goals: list[ArrayLike], repair: bool
     ) -> list[Heatmap]:
         """Predict for tasks on one map, in one pass of the network."""
-        check_grid(grid)
         repair = truth_value("repair", repair)
         tasks = [grid.check_task(*task) for task in zip(starts, goals, strict=True)]
         shape = scaled_shape(grid.shape, int(self.record["working_size"]))

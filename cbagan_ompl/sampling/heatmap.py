@@ -16,6 +16,8 @@ from ..maps.connectivity import in_one_component
 from ..maps.endpoints import check_point
 from ..maps.grid_map import GridMap
 from ..maps.grid_search import pull_taut, shortest_path
+from ..robots.poses import map_and_position
+from ..robots.robot import Robot
 from .bands import half_width, paint_band
 from .bridges import bridge
 from .headings import check_headings, descend, look_up, sample_headings
@@ -155,7 +157,9 @@ class Heatmap:
         )
 
     @classmethod
-    def corridor(cls, grid: GridMap, start: ArrayLike, goal: ArrayLike) -> Heatmap:
+    def corridor(
+        cls, grid: GridMap, start: ArrayLike, goal: ArrayLike, robot: Robot | None = None
+    ) -> Heatmap:
         """Return a band around the shortest path that a grid search finds: the oracle control.
 
         The search is 8-connected without cutting corners, its path pulled taut. It shows what a
@@ -163,8 +167,9 @@ class Heatmap:
 
         Args:
             grid: the map.
-            start: (x, y), world.
-            goal: (x, y), world.
+            start: (x, y), world, or a pose for a robot with heading.
+            goal: the same.
+            robot: what moves; the heat map lies on the map of its positions. None for a point.
 
         Raises:
             TaskError: see :meth:`GridMap.check_task`.
@@ -175,6 +180,8 @@ class Heatmap:
             True
         """
         check_grid(grid, HeatmapError)
+        _, start = map_and_position(grid, robot, "start", start)
+        grid, goal = map_and_position(grid, robot, "goal", goal)
         endpoints = grid.to_pixel(grid.check_task(start, goal))
         pixels = shortest_path(grid.free, *pixel_pair(endpoints))
         assert pixels is not None, "check_task has made sure that a path exists"

@@ -12,6 +12,7 @@ import pytest
 from cbagan_ompl import (
     CbaganOmplError,
     GridMap,
+    Heatmap,
     MapError,
     Replanner,
     Robot,
@@ -158,6 +159,26 @@ def test_bad_input(
     arguments = {"start": START, "goal": GOAL, "robot": ROBOTS["SE(2)"], "sampler": "uniform"}
     with pytest.raises(kind, match=message):
         plan(open_space, **(arguments | changes))
+
+
+def test_heat_maps_of_a_robot(open_space: GridMap) -> None:
+    pytest.importorskip("torch")
+    from cbagan_ompl import load_model
+
+    robot = ROBOTS["SE(2)"]
+    model = load_model()
+    for heatmap in (
+        model.predict(open_space, START, GOAL, robot=robot),
+        Heatmap.corridor(open_space, START, GOAL, robot),
+        *model.predict_many(open_space, [START], [GOAL[:2]], robot=robot),
+    ):
+        assert heatmap.grid.free.sum() < open_space.free.sum()
+        assert heatmap.connects(START[:2], GOAL[:2])
+    for call in (model.predict, Heatmap.corridor):
+        with pytest.raises(RobotError, match="expected a Robot"):
+            call(open_space, START, GOAL, robot="car")  # type: ignore[arg-type]
+        with pytest.raises(TaskError):
+            call(open_space, START, GOAL)
 
 
 def test_gaps_too_narrow_for_any_heading_are_told_at_once(open_space: GridMap) -> None:
