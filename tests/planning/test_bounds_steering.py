@@ -174,6 +174,7 @@ def test_exceptions_leave_the_bounds(walled_in: GridMap, place: str) -> None:
             assert is_as_before(setup, walled_in), calls
 
 
+@pytest.mark.usefixtures("interruptible")
 def test_interrupts_leave_the_bounds(walled_in: GridMap) -> None:
     values = np.where(walled_in.free, 0.6, 0).astype(np.float32)
     setup = new_setup(walled_in)
