@@ -42,8 +42,8 @@ def descent_directions(
     Example:
         >>> free = np.ones((1, 64), bool)
         >>> angles = descent_directions(free, np.ones((1, 64), np.float32), np.array([[60.5, 0.5]]))
-        >>> angles[0, [5, 62]].round(2).tolist()
-        [0.0, 3.14]
+        >>> (abs(angles[0, [5, 62]]) > (0.2, 3.0)).tolist()
+        [False, True]
     """
     size = max(_BLOCK_SIZE, 2 * -(-max(free.shape) // (2 * _MOST_BLOCKS)))
     right, down = _edge_costs(free, cost, size)
