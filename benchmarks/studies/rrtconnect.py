@@ -26,6 +26,7 @@ from cbagan_ompl.datasets.geodesic import distance_field
 from cbagan_ompl.datasets.synthetic import SyntheticSettings, generate_map_tasks
 from cbagan_ompl.maps.tasks import Task
 from cbagan_ompl.planning.compat import ompl_version
+from cbagan_ompl.planning.workspace import Workspace
 from cbagan_ompl.sampling.options import NO_ADAPTATION
 
 # None is OMPL's choice, a fifth of the diagonal.
@@ -70,7 +71,7 @@ def synthetic_tasks(count: int) -> list[BenchmarkTask]:
         grid, start, goal = GridMap(synthetic.maps[0]), synthetic.start[0], synthetic.goal[0]
         (u, v), (x, y) = start.astype(int).tolist(), goal.astype(int).tolist()
         optimum = float(distance_field(grid.free, (u, v))[y, x])
-        tasks.append(BenchmarkTask(grid, number, Task(start, goal, optimum)))
+        tasks.append(BenchmarkTask(Workspace(grid), number, Task(start, goal, optimum)))
     return tasks
 
 

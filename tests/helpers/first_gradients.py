@@ -34,10 +34,11 @@ def main(folder: str, output: str) -> None:
         run = Run(gan, np.random.default_rng(0), torch.Generator().manual_seed(0))
         _step(run, CONFIG, tasks, np.arange(8), cpu, 0)
         if group.is_leader:
+            networks = {"generator": gan.generator, **gan.discriminators}
             gradients = {
                 f"{name}.{key}": parameter.grad
                 for name in gan.learning_rates
-                for key, parameter in getattr(gan, name).named_parameters()
+                for key, parameter in networks[name].named_parameters()
             }
             buffers = dict(gan.generator.named_buffers())
             torch.save({**gradients, **buffers}, output)

@@ -52,7 +52,7 @@ SPACE = b"""\
     [
         (b"    deep = " + b"(" * 200_000 + b"1" + b")" * 200_000 + b"\n", "ended by SIGSEGV"),
         (LOOP, "more than 2 s for one prediction"),
-        (SPACE, "RuntimeError"),
+        (SPACE, "not enough memory"),
         (b"    wrong = torch.nothing(1)\n", "RuntimeError"),
     ],
 )
