@@ -16,7 +16,7 @@ from ..maps.checks import check_grid
 from ..maps.grid_map import GridMap
 from ..maps.grid_search import prepare_search
 from ..networks.config import MAX_IMAGE_SIZE
-from ..robots.poses import map_and_position, position_map
+from ..robots.poses import position_map, position_of
 from ..robots.robot import Robot
 from ..sampling.heatmap import Heatmap
 from .bundled_models import find_model
@@ -198,9 +198,10 @@ class Predictor:
         starts, goals = _list_points("starts", starts), _list_points("goals", goals)
         if len(starts) != len(goals):
             raise TaskError(f"each task has a start and a goal, got {len(starts)} and {len(goals)}")
-        starts = [map_and_position(grid, robot, "start", start)[1] for start in starts]
-        goals = [map_and_position(grid, robot, "goal", goal)[1] for goal in goals]
-        grid = grid if robot is None else position_map(grid, robot)
+        if robot is not None:
+            grid = position_map(grid, robot)
+            starts = [position_of(robot, "start", start) for start in starts]
+            goals = [position_of(robot, "goal", goal) for goal in goals]
         return [
             heatmap
             for i in range(0, len(starts), _BATCH)

@@ -27,7 +27,7 @@ from typing import Any
 from ..common.signals import ENDING
 from ..errors import PlannerError
 from ..sampling.sampler import HeatmapSampler
-from .compat import ob, planner_data
+from .compat import ob, plane_bounds, planner_data
 from .monitor import PlannerMonitor
 from .states import StateAccess, pose_space
 
@@ -336,8 +336,4 @@ class _FirstGrowth:
 
 
 def _copy_bounds(bounds: Any) -> Any:
-    copy = ob.RealVectorBounds(2)
-    for axis in range(2):
-        copy.setLow(axis, bounds.low[axis])
-        copy.setHigh(axis, bounds.high[axis])
-    return copy
+    return plane_bounds(bounds.low, bounds.high)

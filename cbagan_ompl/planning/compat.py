@@ -106,7 +106,7 @@ def plane_space(low: NDArray[np.float64], high: NDArray[np.float64]) -> Any:
         low: lower bounds, shape (2,).
         high: upper bounds, shape (2,).
     """
-    bounds = _bounds(low, high)
+    bounds = plane_bounds(low, high)
     if not BOOST_PYTHON:
         space = ob.RealVectorStateSpace(2)
         space.setBounds(bounds)
@@ -116,7 +116,8 @@ def plane_space(low: NDArray[np.float64], high: NDArray[np.float64]) -> Any:
     return owner.getSubspace(0)
 
 
-def _bounds(low: NDArray[np.float64], high: NDArray[np.float64]) -> Any:
+def plane_bounds(low: Any, high: Any) -> Any:
+    """Return bounds of positions; arguments as for :func:`plane_space`, or any sequences."""
     bounds = ob.RealVectorBounds(2)
     for axis in range(2):
         bounds.setLow(axis, float(low[axis]))
@@ -124,7 +125,7 @@ def _bounds(low: NDArray[np.float64], high: NDArray[np.float64]) -> Any:
     return bounds
 
 
-def pose_space(
+def make_pose_space(
     name: str,
     turning_radius: float | None,
     low: NDArray[np.float64],
@@ -140,7 +141,7 @@ def pose_space(
     """
     kind = getattr(ob, name)
     space = kind() if turning_radius is None else kind(float(turning_radius))
-    space.setBounds(_bounds(low, high))
+    space.setBounds(plane_bounds(low, high))
     return space
 
 

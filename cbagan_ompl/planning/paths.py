@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import compat
+from .compat import new_state, typed_state
 from .workspace import Endpoints, Workspace
 
 # Slack of the check that a path ends in the goal region, for the rounding of a distance.
@@ -34,13 +34,9 @@ def checked_path(
     space = setup.getStateSpace()
     goal = workspace.make_state(space, endpoints[1])
     end = workspace.make_state(space, path[-1])
-    at_start = bool(np.allclose(path[0], endpoints[0], rtol=0, atol=_ROUNDING))
-    at_goal = float(space.distance(_raw(end), _raw(goal))) <= tolerance + _ROUNDING
+    at_start = np.array_equal(path[0], endpoints[0])
+    at_goal = float(space.distance(typed_state(end), typed_state(goal))) <= tolerance + _ROUNDING
     return path if at_start and at_goal and workspace.is_free(setup, path) else None
-
-
-def _raw(state: Any) -> Any:
-    return compat.typed_state(state)
 
 
 def path_cost(setup: Any, workspace: Workspace, path: NDArray[np.float64]) -> float:
@@ -57,7 +53,7 @@ def path_cost(setup: Any, workspace: Workspace, path: NDArray[np.float64]) -> fl
         return float(np.hypot(*np.diff(path, axis=0).T).sum())
     space = setup.getStateSpace()
     states = [workspace.make_state(space, pose) for pose in path]
-    return sum(float(space.distance(_raw(a), _raw(b))) for a, b in pairwise(states))
+    return sum(float(space.distance(typed_state(a), typed_state(b))) for a, b in pairwise(states))
 
 
 def follow_path(
@@ -80,13 +76,13 @@ def follow_path(
         return divide_segments(path, step)
     space = setup.getStateSpace()
     states = [workspace.make_state(space, endpoint) for endpoint in path]
-    passed = compat.new_state(space)
+    passed = new_state(space)
     points = [path[0]]
     for (start, end), way_point in zip(pairwise(states), path[1:], strict=True):
         count = int(np.ceil(workspace.reach_of_motion(space, start, end) / step))
         for i in range(1, count):
-            space.interpolate(_raw(start), _raw(end), i / count, _raw(passed))
-            points.append(workspace.read_states([_raw(passed)])[0])
+            space.interpolate(typed_state(start), typed_state(end), i / count, typed_state(passed))
+            points.append(workspace.read_states([typed_state(passed)])[0])
         points.append(way_point)
     return np.array(points)
 

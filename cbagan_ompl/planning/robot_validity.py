@@ -6,16 +6,15 @@ from collections.abc import Callable
 from math import pi
 from typing import Any
 
-from ..errors import PlannerError, RobotError, show
+from ..errors import PlannerError
 from ..maps.checks import check_grid
 from ..maps.grid_map import GridMap
-from ..robots.robot import Robot
+from ..robots.robot import Robot, check_robot
 from ..robots.shape_checker import Pose, ShapeChecker
 from . import compat
 from .compat import ob
-from .states import pose_space, space_of
-
-_LAST_VALID_PRECISION = 1e-3
+from .states import pose_space, read_pose, space_of
+from .validity import set_last_valid
 
 
 class RobotValidityChecker(ob.StateValidityChecker):  # type: ignore[misc]
@@ -153,17 +152,12 @@ class RobotMotionValidator(ob.MotionValidator):  # type: ignore[misc]
         # The planner will take the motion to that state for valid, so that motion is checked. It
         # need not be a part of this one: after rounding, a curve may go another way.
         part_end = compat.typed_state(self._part_end)
-        low, high = 0.0, 1.0
-        while high - low > _LAST_VALID_PRECISION:
-            middle = (low + high) / 2
-            self._space.interpolate(s1, s2, middle, part_end)
-            if self._is_free(s1, part_end):
-                low = middle
-            else:
-                high = middle
-        last_valid.second = low
-        if last_valid.first is not None:
-            self._space.interpolate(s1, s2, low, last_valid.first)
+
+        def is_free(part: float) -> bool:
+            self._space.interpolate(s1, s2, part, part_end)
+            return self._is_free(s1, part_end)
+
+        set_last_valid(last_valid, self._space, s1, s2, is_free)
 
 
 def shape_checker(grid: GridMap, robot: Robot) -> ShapeChecker:
@@ -174,8 +168,7 @@ def shape_checker(grid: GridMap, robot: Robot) -> ShapeChecker:
         RobotError: not a :class:`Robot`, or one that is larger than the map.
     """
     check_grid(grid)
-    if not isinstance(robot, Robot):
-        raise RobotError(f"expected a Robot, got {show(robot)}; make one with Robot.rectangle(...)")
+    check_robot(robot)
     return ShapeChecker.of(grid, robot)
 
 
@@ -187,9 +180,9 @@ def pose_reader(space: Any, robot: Robot) -> Callable[[Any], Pose]:
     """
     poses = pose_space(space)
     if poses is space:
-        return lambda state: (state.getX(), state.getY(), state.getYaw())
+        return read_pose
     if poses is not None:
-        return lambda state: (state[0].getX(), state[0].getY(), state[0].getYaw())
+        return lambda state: read_pose(state[0])
     if isinstance(space, ob.RealVectorStateSpace) and space.getDimension() == 2:
         if robot.has_heading:
             raise PlannerError(

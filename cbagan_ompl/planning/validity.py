@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import floor
 from typing import Any
 
@@ -125,17 +126,37 @@ class GridMotionValidator(ob.MotionValidator):  # type: ignore[misc]
         self, last_valid: Any, s1: Any, s2: Any, segment: tuple[float, float, float, float]
     ) -> None:
         u0, v0, u1, v1 = segment
-        low, high = 0.0, 1.0
-        while high - low > _LAST_VALID_PRECISION:
-            middle = (low + high) / 2
-            u, v = u0 + middle * (u1 - u0), v0 + middle * (v1 - v0)
-            if segment_is_free(self._cells, self._width, self._height, u0, v0, u, v):
-                low = middle
-            else:
-                high = middle
-        last_valid.second = low
-        if last_valid.first is not None:
-            self._space.interpolate(s1, s2, low, last_valid.first)
+
+        def is_free(part: float) -> bool:
+            u, v = u0 + part * (u1 - u0), v0 + part * (v1 - v0)
+            return segment_is_free(self._cells, self._width, self._height, u0, v0, u, v)
+
+        set_last_valid(last_valid, self._space, s1, s2, is_free)
+
+
+def set_last_valid(
+    last_valid: Any, space: Any, s1: Any, s2: Any, is_free: Callable[[float], bool]
+) -> None:
+    """Set what a planner of OMPL 1.x wants to know of a motion that is not valid.
+
+    Args:
+        last_valid: pair of a state, or None, and a number: the last valid state, to within a
+            thousandth of the motion, and how far along the motion it is.
+        space: of the states.
+        s1: where the motion begins, a valid state.
+        s2: where it ends.
+        is_free: whether the motion up to a fraction of it is valid.
+    """
+    low, high = 0.0, 1.0
+    while high - low > _LAST_VALID_PRECISION:
+        middle = (low + high) / 2
+        if is_free(middle):
+            low = middle
+        else:
+            high = middle
+    last_valid.second = low
+    if last_valid.first is not None:
+        space.interpolate(s1, s2, low, last_valid.first)
 
 
 def _straight_state_access(space: Any) -> StateAccess:

@@ -97,7 +97,7 @@ class Workspace:
         low, high = self.source.bounds
         if not self.robot.has_heading:
             return compat.plane_space(low, high)
-        return compat.pose_space(self.robot.state_space, self.robot.turning_radius, low, high)
+        return compat.make_pose_space(self.robot.state_space, self.robot.turning_radius, low, high)
 
     def make_checks(self, si: Any) -> tuple[Any, Any]:
         """Return a validity checker and a motion validator, both exact.

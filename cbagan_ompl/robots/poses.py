@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..common.validation import is_finite_number
-from ..errors import RobotError, TaskError, show
+from ..errors import TaskError, show
 from ..maps.endpoints import Moves, check_position
 from ..maps.grid_map import GridMap
-from .robot import Robot
+from .robot import Robot, check_robot
 from .shape_checker import ShapeChecker
 
 #: Start and goal as poses (x, y, yaw), world, (3,) each.
@@ -32,6 +32,7 @@ def position_map(grid: GridMap, robot: Robot) -> GridMap:
         robot: the robot.
 
     Raises:
+        RobotError: no robot.
         MapError: the robot fits nowhere.
 
     Example:
@@ -39,37 +40,29 @@ def position_map(grid: GridMap, robot: Robot) -> GridMap:
         >>> position_map(grid, Robot.rectangle(4, 2)) is grid
         True
     """
+    check_robot(robot)
     if not robot.has_heading:
         return grid.inflated(robot.radius)
     return grid.inflated(max(0.0, robot.inscribed_radius - np.sqrt(2) * grid.resolution))
 
 
-def map_and_position(
-    grid: GridMap, robot: Robot | None, role: str, endpoint: ArrayLike
-) -> tuple[GridMap, ArrayLike]:
-    """Return the map of the positions of a robot, and the position of an endpoint.
+def position_of(robot: Robot, role: str, endpoint: ArrayLike) -> ArrayLike:
+    """Return the position of an endpoint, which may be a pose where the robot has a heading.
 
     Args:
-        grid: the map.
-        robot: what moves; None for a point.
+        robot: what moves.
         role: "start" or "goal", for messages.
-        endpoint: (x, y), world; or (x, y, yaw) for a robot with heading, radians.
+        endpoint: (x, y), world; or (x, y, yaw), radians.
 
     Raises:
-        RobotError: no robot.
-        MapError: the robot fits nowhere.
         TaskError: a pose that is none.
 
     Example:
-        >>> map_and_position(GridMap([[1] * 9] * 9), Robot.rectangle(4, 2), "start", (4, 4, 0))[1]
+        >>> position_of(Robot.rectangle(4, 2), "start", (4, 4, 0))
         array([4., 4.])
     """
-    if robot is None:
-        return grid, endpoint
-    if not isinstance(robot, Robot):
-        raise RobotError(f"expected a Robot, got {show(robot)}; make one with Robot.rectangle(...)")
     is_pose = robot.has_heading and np.shape(endpoint) == (3,)
-    return position_map(grid, robot), check_pose(role, endpoint)[:2] if is_pose else endpoint
+    return check_pose(role, endpoint)[:2] if is_pose else endpoint
 
 
 def check_pose(role: str, pose: ArrayLike) -> NDArray[np.float64]:

@@ -263,6 +263,19 @@ class Robot:
         return np.asarray(self.vertices @ rotation + (x, y))
 
 
+def check_robot(robot: object) -> None:
+    """Raise if a value is no robot.
+
+    Raises:
+        RobotError: it is none; the message says how to make one.
+
+    Example:
+        >>> check_robot(Robot.point())
+    """
+    if not isinstance(robot, Robot):
+        raise RobotError(f"expected a Robot, got {show(robot)}; make one with Robot.rectangle(...)")
+
+
 def _positive(name: str, value: float) -> float:
     try:
         number = positive_number(name, value)

@@ -16,7 +16,7 @@ from ..maps.connectivity import in_one_component
 from ..maps.endpoints import check_point
 from ..maps.grid_map import GridMap
 from ..maps.grid_search import pull_taut, shortest_path
-from ..robots.poses import map_and_position
+from ..robots.poses import position_map, position_of
 from ..robots.robot import Robot
 from .bands import half_width, paint_band
 from .bridges import bridge
@@ -180,8 +180,9 @@ class Heatmap:
             True
         """
         check_grid(grid, HeatmapError)
-        _, start = map_and_position(grid, robot, "start", start)
-        grid, goal = map_and_position(grid, robot, "goal", goal)
+        if robot is not None:
+            grid = position_map(grid, robot)
+            start, goal = position_of(robot, "start", start), position_of(robot, "goal", goal)
         endpoints = grid.to_pixel(grid.check_task(start, goal))
         pixels = shortest_path(grid.free, *pixel_pair(endpoints))
         assert pixels is not None, "check_task has made sure that a path exists"
