@@ -11,6 +11,7 @@ from typing import Any
 from .. import __version__
 from ..common.files import read_bytes, read_text
 from ..errors import ConfigError, HeatmapError, ModelError, show
+from ..maps.grid_search import search_kind
 from ..planning.heatmap_sources import AUTO, LEARNED
 from .settings import Settings
 from .tasks import BenchmarkTask, heatmap_path
@@ -33,8 +34,9 @@ def record_inputs(tasks: Sequence[BenchmarkTask], settings: Settings) -> dict[st
 
     Returns:
         What ``settings.json`` holds: the flat keys of :meth:`.Settings.to_dict`, and
-        ``ompl_version``, ``package_version``, ``model_hashes`` by sampler, ``maps`` by name, and
-        ``tasks`` by name with their coordinates.
+        ``ompl_version``, ``package_version``, ``grid_search`` (what corridors are searched
+        with), ``model_hashes`` by sampler, ``maps`` by name, and ``tasks`` by name with their
+        coordinates.
 
     Raises:
         ModelError: a model cannot be read.
@@ -46,6 +48,7 @@ def record_inputs(tasks: Sequence[BenchmarkTask], settings: Settings) -> dict[st
         **settings.to_dict(),
         "package_version": __version__,
         "ompl_version": ompl_version(),
+        "grid_search": search_kind(),
         "model_hashes": {
             sampler: _hash(read_bytes(path, ModelError))
             for sampler, path in sorted(model_files(settings).items())
@@ -104,7 +107,7 @@ def model_files(settings: Settings) -> dict[str, Path]:
     from ..inference.bundled_models import find_model
 
     models: dict[str, str | None] = dict(settings.models)
-    if {LEARNED, AUTO} & set(settings.samplers) - set(models) - set(settings.heatmap_dirs):
+    if {LEARNED, AUTO} & settings.sources - set(models) - set(settings.heatmap_dirs):
         models[LEARNED] = None
     return {sampler: find_model(model) for sampler, model in models.items()}
 
