@@ -6,8 +6,8 @@
 
 MAPS is a folder with `png/*.png` and `tasks.csv`, SUITES one with `bench-mr/*.map` and
 `nav2/*.yaml`, DATASET the folder of the paper's (map, point, ROI) set. OTHER_VENV has the other
-version of OMPL. Each file is a step; a step whose file is there is skipped, and a benchmark that was
-interrupted goes on with the tasks that are missing. So the same command goes on after an interrupt.
+version of OMPL. Each file is a step; a step whose file is there is skipped, and a benchmark that
+was interrupted goes on with the tasks that are missing, so the same command goes on.
 Steps are independent: `--only` chooses some, `--list` prints their commands. All take under an hour
 of two cores. Trainings, and what scores the networks on the paper's data, are not among them: see
 benchmarks/README.md.
@@ -32,8 +32,8 @@ from cbagan_ompl.common.files import write_json
 ROOT = Path(__file__).resolve().parents[1]
 STUDIES = ROOT / "benchmarks" / "studies"
 SUITES = ROOT / "benchmarks" / "suites"
-# What the tables do not need of a summary: the paper's maps are of no kind.
-_UNUSED = {"paper_suite": ("families",)}
+# What the tables do not need of a summary.
+_UNUSED = ("families", "hosts")
 
 
 @dataclass(frozen=True)
@@ -99,10 +99,12 @@ def main() -> None:
     parser.add_argument("--output", type=Path, required=True, metavar="DIR")
     parser.add_argument("--other-python", metavar="FILE", help="Python with the other OMPL")
     parser.add_argument("--only", nargs="+", metavar="NAME", help="steps to be run")
+    parser.add_argument("--jobs", metavar="N", help="tasks at a time (default: what suites say)")
     parser.add_argument("--list", action="store_true", help="print the commands, run nothing")
     args = parser.parse_args()
     args.output.mkdir(parents=True, exist_ok=True)
     places = {name: str(getattr(args, name)) for name in ("maps", "suites", "dataset")}
+    jobs = [] if args.jobs is None else ["--jobs", args.jobs]
     pythons = {
         version_of(python): python for python in (sys.executable, args.other_python) if python
     }
@@ -110,11 +112,11 @@ def main() -> None:
     for version, python, step in steps_of(pythons, args.only):
         name = f"{step.name}_ompl_{version}" if step.both else step.name
         if args.list:
-            print(shlex.join(command(step, python, places, args.output, name)))
+            print(shlex.join(command(step, python, places, args.output, name, jobs)))
         elif not (args.output / f"{name}.json").exists():
             began = time.perf_counter()
             print(f"{name} ...", flush=True)
-            status = run(step, python, places, args.output, name)
+            status = run(step, python, places, args.output, name, jobs)
             print(f"{name}: status {status}, {time.perf_counter() - began:.0f} s", flush=True)
             failed += [name] if status else []
     if failed:
@@ -141,7 +143,9 @@ def steps_of(
                 yield version, python, step
 
 
-def command(step: Step, python: str, places: dict[str, str], output: Path, name: str) -> list[str]:
+def command(
+    step: Step, python: str, places: dict[str, str], output: Path, name: str, jobs: Sequence[str]
+) -> list[str]:
     """Return the command of a step."""
     work = output / "work" / name
     known = {**places, "json": str(output / f"{name}.json"), "work": str(work)}
@@ -150,21 +154,26 @@ def command(step: Step, python: str, places: dict[str, str], output: Path, name:
         filled = word.format(**known)
         words += sorted(glob(filled)) or [filled]
     if step.is_benchmark:
-        words += ["--output", str(work)]
+        words += ["--output", str(work), *jobs]
         words += ["--resume"] if (work / "settings.json").exists() else []
     return [python, *words]
 
 
-def run(step: Step, python: str, places: dict[str, str], output: Path, name: str) -> int:
+def run(
+    step: Step, python: str, places: dict[str, str], output: Path, name: str, jobs: Sequence[str]
+) -> int:
     """Run a step; return its exit status."""
-    words = command(step, python, places, output, name)
+    words = command(step, python, places, output, name, jobs)
     (output / "work").mkdir(exist_ok=True)
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
     with (output / "work" / f"{name}.log").open("a") as log:
         status = subprocess.run(words, stdout=log, stderr=log, env=environment).returncode
     if status == 0 and step.is_benchmark:
-        summary = json.loads((output / "work" / name / "summary.json").read_text())
-        for key in _UNUSED.get(step.name, ()):
+        text = (output / "work" / name / "summary.json").read_text()
+        for folder, path in {**places, "output": str(output), "root": str(ROOT)}.items():
+            text = text.replace(path, folder.upper())
+        summary = json.loads(text)
+        for key in _UNUSED:
             del summary[key]
         write_json(output / f"{name}.json", summary)
     return status

@@ -1,6 +1,6 @@
-"""Tasks of the paper's data set for `cbagan-ompl benchmark`.
+r"""Tasks of the paper's data set for `cbagan-ompl benchmark`.
 
-    python benchmarks/studies/paper_suite.py DATASET --tasks 30 --output paper-suite \\
+    python benchmarks/studies/paper_suite.py DATASET --tasks 30 --output paper-suite \
         --run @benchmarks/suites/paper.args --model paper-trained=cbagan --output results
 
 DATASET is the folder of the published (map, point, ROI) set. Some of its test tasks are chosen at
