@@ -22,10 +22,11 @@ from ..inference.model_files import (
     MAX_NAME_LENGTH,
     RECORD_NAME,
     RECORD_SCHEMA,
+    SPLIT_METHODS,
     is_model,
     read_manifest,
 )
-from ..networks.export_model import RegionModel
+from ..networks.export_model import SplitModel, make_region_model
 from .checkpoints import best_generator, load_checkpoint
 
 INPUTS = (
@@ -82,7 +83,7 @@ def export(
     record = make_record(target.stem, state, generator, note)
     make_folder(target.parent, ModelError)
     _check_outputs(target, as_path(checkpoint), force)
-    model = RegionModel(generator).eval()
+    model = make_region_model(generator)
     # Convolutions in this layout take four fifths of the time on a CPU.
     model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     save_script(model, target, record)
@@ -136,7 +137,8 @@ def script_bytes(model: nn.Module, record: dict[str, Any]) -> bytes:
         # package's models have, and torch goes on reading and writing it.
         warnings.simplefilter("ignore", DeprecationWarning)
         # No optimize_for_inference: what it writes cannot be loaded again.
-        frozen = torch.jit.freeze(torch.jit.script(model))
+        methods = list(SPLIT_METHODS) if isinstance(model, SplitModel) else []
+        frozen = torch.jit.freeze(torch.jit.script(model), preserved_attrs=methods)
         extra = {RECORD_NAME: json.dumps(record, indent=1)}
         buffer = io.BytesIO()
         torch.jit.save(frozen, buffer, _extra_files=extra)
