@@ -208,7 +208,7 @@ def load_script(script: bytes) -> torch.nn.Module:
     import torch
 
     with warnings.catch_warnings():
-        # TorchScript is deprecated, see save_script in training/export.
+        # TorchScript is deprecated, see training/torchscript.
         warnings.simplefilter("ignore", DeprecationWarning)
         module: torch.nn.Module = torch.jit.load(io.BytesIO(script), map_location="cpu")  # type: ignore[no-untyped-call]
     return module

@@ -32,7 +32,7 @@ from ..networks.generator import Generator
 from ..networks.patch_generator import PatchGenerator
 from .batches import encode, make_batch
 from .checkpoints import load_checkpoint
-from .export import script_bytes
+from .torchscript import script_bytes
 
 # Options of the architecture that records of earlier versions call otherwise.
 _FORMER_NAMES = {"metrics": "cost_maps"}
