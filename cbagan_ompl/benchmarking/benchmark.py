@@ -13,7 +13,7 @@ from ..errors import ConfigError
 from .database import write_database
 from .inputs import check_same, record_inputs
 from .logs import ExperimentLog, read_log
-from .measures import AUTO_SOURCE, GRID_SEARCH, thresholds
+from .measures import AUTO_SOURCE, thresholds
 from .plots import save_plots
 from .remote import run_jobs_remotely
 from .report import Conditions, markdown, summary_json
@@ -170,7 +170,6 @@ def write_results(
         command,
         hosts=Counter(log.host for log in logs),
         left_out=left_out or {},
-        grid_search=_count_values(logs, GRID_SEARCH),
         auto=_count_values(logs, AUTO_SOURCE),
     )
     write_json(folder / "summary.json", summary_json(results, conditions))

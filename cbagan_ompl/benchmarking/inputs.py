@@ -11,7 +11,6 @@ from typing import Any
 from .. import __version__
 from ..common.files import read_bytes, read_text
 from ..errors import ConfigError, HeatmapError, ModelError, show
-from ..maps.grid_search import search_kind
 from ..planning.heatmap_sources import AUTO, LEARNED
 from .settings import Settings
 from .tasks import BenchmarkTask, heatmap_path
@@ -34,9 +33,8 @@ def record_inputs(tasks: Sequence[BenchmarkTask], settings: Settings) -> dict[st
 
     Returns:
         What ``settings.json`` holds: the flat keys of :meth:`.Settings.to_dict`, and
-        ``ompl_version``, ``package_version``, ``grid_search`` (what corridors are searched
-        with), ``model_hashes`` by sampler, ``maps`` by name, and ``tasks`` by name with their
-        coordinates.
+        ``ompl_version``, ``package_version``, ``model_hashes`` by sampler, ``maps`` by name, and
+        ``tasks`` by name with their coordinates.
 
     Raises:
         ModelError: a model cannot be read.
@@ -48,7 +46,6 @@ def record_inputs(tasks: Sequence[BenchmarkTask], settings: Settings) -> dict[st
         **settings.to_dict(),
         "package_version": __version__,
         "ompl_version": ompl_version(),
-        "grid_search": search_kind(),
         "model_hashes": {
             sampler: _hash(read_bytes(path, ModelError))
             for sampler, path in sorted(model_files(settings).items())

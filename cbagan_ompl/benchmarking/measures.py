@@ -43,8 +43,6 @@ SIMPLIFY = "simplification time REAL"
 MAP = "map VARCHAR"
 #: Property of an experiment: what kind of map it is.
 FAMILY = "map family VARCHAR"
-#: Property of an experiment: what corridors were searched with, ``compiled`` or ``SciPy``.
-GRID_SEARCH = "grid search VARCHAR"
 #: Property of an experiment: the sampler that ``auto`` stood for on its map.
 AUTO_SOURCE = "auto VARCHAR"
 #: Property of an experiment: the least cost of all its runs, or the optimal one where given.

@@ -43,7 +43,6 @@ class Conditions:
         command: command that repeats the benchmark.
         hosts: number of tasks that each host has run, by its name.
         left_out: why a task cannot be planned for, by its name.
-        grid_search: number of tasks by what corridors were searched with.
         auto: number of tasks by the sampler that ``auto`` stood for.
     """
 
@@ -54,7 +53,6 @@ class Conditions:
     command: str
     hosts: Mapping[str, int] = field(default_factory=dict)
     left_out: Mapping[str, str] = field(default_factory=dict)
-    grid_search: Mapping[str, int] = field(default_factory=dict)
     auto: Mapping[str, int] = field(default_factory=dict)
 
 
@@ -92,7 +90,6 @@ def summary_json(results: Results, conditions: Conditions) -> dict[str, Any]:
         "ompl_version": conditions.ompl_version,
         "tasks": conditions.tasks,
         "hosts": dict(conditions.hosts),
-        "grid_search": dict(conditions.grid_search),
         "auto": dict(conditions.auto),
         "left_out": dict(conditions.left_out),
         "settings": conditions.settings.to_dict(),
@@ -145,13 +142,8 @@ def markdown(results: Results, conditions: Conditions) -> str:
 
 
 def _describe_sources(conditions: Conditions) -> str:
-    """Return what searched the corridors, and what ``auto`` stood for."""
-    said = []
-    if conditions.grid_search:
-        said.append(f"Grid search: {_counted(conditions.grid_search)}.")
-    if conditions.auto:
-        said.append(f"Auto: {_counted(conditions.auto)}.")
-    return " ".join(said)
+    """Return what ``auto`` stood for."""
+    return f"Auto: {_counted(conditions.auto)}." if conditions.auto else ""
 
 
 def _counted(counts: Mapping[str, int]) -> str:

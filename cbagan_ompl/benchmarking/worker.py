@@ -10,7 +10,6 @@ from zlib import crc32
 from ..common.files import write_atomically
 from ..common.text import one_line
 from ..errors import ConfigError, show
-from ..maps.grid_search import search_kind
 from ..planning.heatmap_sources import (
     AUTO,
     LEARNED,
@@ -26,7 +25,6 @@ from .logs import GEOMETRIC, ExperimentLog, concatenate_logs, format_log, parse_
 from .measures import (
     AUTO_SOURCE,
     FAMILY,
-    GRID_SEARCH,
     MAP,
     add_measures,
     check_measures,
@@ -197,7 +195,7 @@ def _resolve_auto(job: Job) -> tuple[str, ModelOrFile | None]:
 
 def _add_task(log: ExperimentLog, job: Job) -> ExperimentLog:
     """Return a log with what the task is, and what makes its heat maps here."""
-    made_by = {GRID_SEARCH: search_kind()}
+    made_by = {}
     if AUTO in job.settings.sources:
         made_by[AUTO_SOURCE] = _resolve_auto(job)[0]
     return replace(log, parameters={**log.parameters, **_task_parameters(job), **made_by})

@@ -78,18 +78,14 @@ def test_tasks_left_out_and_sources_are_named() -> None:
         {},
         "command",
         left_out=left_out,
-        grid_search={"compiled": 3},
         auto={"corridor": 2, "learned": 1},
     )
     report = markdown(results, conditions)
-    assert "Grid search: compiled. Auto: corridor (2), learned (1)." in report
+    assert "Auto: corridor (2), learned (1)." in report
     assert "12 tasks that cannot be planned for were left out." in report
     assert "- city_9: start" in report
     assert "city_10" not in report
     assert "- and 2 more" in report
     summary = summary_json(results, conditions)
     assert summary["left_out"] == left_out
-    assert (summary["grid_search"], summary["auto"]) == (
-        {"compiled": 3},
-        {"corridor": 2, "learned": 1},
-    )
+    assert summary["auto"] == {"corridor": 2, "learned": 1}

@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -42,12 +43,11 @@ def files_in(folder: Path) -> set[str]:
 
 
 @pytest.fixture
-def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty folder for the temporary files of the commands."""
-    folder = tmp_path / "tmp"
-    folder.mkdir()
-    monkeypatch.setenv("TMPDIR", str(folder))
-    return folder
+def temporary(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """An empty folder for temporary files, with a name short enough for sockets."""
+    with tempfile.TemporaryDirectory() as folder:
+        monkeypatch.setenv("TMPDIR", folder)
+        yield Path(folder)
 
 
 def children_of(process: int) -> list[int]:
@@ -549,3 +549,19 @@ def test_logs_are_those_of_their_task(finished: Finished) -> None:
         check_log(log, job)
     with pytest.raises(CbaganOmplError, match="something else"):
         check_log(finished.logs[1], jobs[0])
+
+
+def test_a_temporary_folder_whose_name_is_too_long_for_sockets(
+    map_folder: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / ("long" * 30)
+    folder.mkdir()
+    done = subprocess.run(
+        [*COMMAND, *words_for(map_folder, tmp_path / "out")],
+        env={**os.environ, "TMPDIR": str(folder)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert "set TMPDIR to a folder with a shorter name" in done.stderr
