@@ -19,11 +19,11 @@ from search_speed import speed_table
 from suite_tables import (
     ROOT,
     VERSIONS,
+    conditions,
     overhead,
     overview,
     read,
     rrtconnect,
-    searched_with,
     suite_tables,
     with_table,
 )
@@ -272,7 +272,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "unseen_maps_connectivity": unseen_maps_connectivity,
     "unseen_maps_inference": unseen_maps_inference,
     "overview": overview,
-    "searched_with": searched_with,
+    "conditions": conditions,
     "rrtconnect": rrtconnect,
     "overhead": overhead,
     "wrong_heatmaps": wrong_heatmaps,

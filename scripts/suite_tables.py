@@ -52,8 +52,8 @@ def with_table(text: str) -> str:
     return f"{before}{begin}\n{overview()}\n{end}{after}"
 
 
-def searched_with() -> str:
-    """Return what the suites ran with: tasks, grid search, choices of ``auto``, tasks left out."""
+def conditions() -> str:
+    """Return what the suites ran with: tasks, runs, choices of ``auto``."""
     rows = []
     for suite in SUITES:
         for version in VERSIONS:
@@ -61,12 +61,9 @@ def searched_with() -> str:
             settings = summary["settings"]
             auto = ", ".join(f"{name} ({n})" for name, n in sorted(summary["auto"].items()))
             runs = f"{settings['runs']} of {settings['time']:g} s"
-            search = ", ".join(summary["grid_search"])
             left_out = str(len(summary["left_out"]))
-            rows.append(
-                [suite, version, str(summary["tasks"]), left_out, runs, search, auto or "-"]
-            )
-    header = ["suite", "OMPL", "tasks", "left out", "runs", "grid search", "`auto` stands for"]
+            rows.append([suite, version, str(summary["tasks"]), left_out, runs, auto or "-"])
+    header = ["suite", "OMPL", "tasks", "left out", "runs", "`auto` stands for"]
     return table(header, rows)
 
 
