@@ -7,14 +7,9 @@ import pytest
 from helpers.logs import make_log, solved, unsolved
 from scipy.stats import bootstrap
 
+from cbagan_ompl.benchmarking.intervals import median_interval, ratio, ratio_interval
 from cbagan_ompl.benchmarking.logs import ExperimentLog
-from cbagan_ompl.benchmarking.statistics import (
-    Summary,
-    median_interval,
-    ratio,
-    ratio_interval,
-    summarize,
-)
+from cbagan_ompl.benchmarking.statistics import Summary, summarize
 
 
 def by_sampler(logs: list[ExperimentLog]) -> dict[str, Summary]:
