@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .compiled_fields import distance_fields
 from .graphs import Graphs
 from .model_files import SPLIT_METHODS
 
@@ -67,7 +66,10 @@ class WavefrontPipeline:
     """
 
     def __init__(self, graphs: Graphs) -> None:
+        from .compiled_fields import distance_fields  # here, since numba takes long to import
+
         self.graphs = graphs
+        self._distance_fields = distance_fields
 
     def read_maps(self, free: NDArray[np.bool_]) -> KeptMaps:
         """Return what depends on the maps alone, see :meth:`WholePipeline.read_maps`."""
@@ -79,7 +81,7 @@ class WavefrontPipeline:
     ) -> NDArray[np.float32]:
         """Return the probability of the region, see :meth:`WholePipeline.probabilities`."""
         edges, cells, features = self.graphs.call("encode", maps.arrays, start, goal)
-        distances = distance_fields(edges, cells)
+        distances = self._distance_fields(edges, cells)
         painted = self.graphs.call("paint", maps.arrays, features, distances)[0]
         height, width = maps.shape
         return painted[:, 0, :height, :width]

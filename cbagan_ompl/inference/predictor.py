@@ -22,7 +22,6 @@ from ..robots.poses import position_map, position_of
 from ..robots.robot import Robot
 from ..sampling.bridges import connect
 from ..sampling.heatmap import Heatmap
-from ..sampling.painting import paint_heatmap
 from .bundled_models import find_model
 from .convolutions import use_onednn
 from .graphs import TorchGraphs
@@ -302,5 +301,7 @@ def _list_points(name: str, points: Iterable[ArrayLike]) -> list[ArrayLike]:
 
 def _make_heatmap(values: NDArray[np.float32], grid: GridMap) -> Heatmap:
     """Return the heat map of a network's output."""
+    from ..sampling.painting import paint_heatmap  # here, since numba takes long to import
+
     painted = paint_heatmap(values, grid, _LEAST_VALUE)
     return painted or Heatmap(np.full(grid.shape, _FLOOR, np.float32), grid)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ..common.compilation import compiled
 from ..maps.grid_map import GridMap
 from .heatmap import Heatmap
 
@@ -42,7 +42,7 @@ def paint_heatmap(values: NDArray[np.float32], grid: GridMap, least: float) -> H
     return heatmap
 
 
-@njit(cache=True)
+@compiled
 def _paint(
     values: NDArray[np.float32],
     free: NDArray[np.bool_],
@@ -94,7 +94,7 @@ def _paint(
     return count
 
 
-@njit(cache=True)
+@compiled
 def _positions(
     size: int, source: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:  # pragma: no cover
