@@ -21,6 +21,7 @@ from ..networks.config import MAX_IMAGE_SIZE
 from ..robots.poses import position_map, position_of
 from ..robots.robot import Robot
 from ..sampling.bridges import connect
+from ..sampling.guarantee import Guarantee
 from ..sampling.heatmap import Heatmap
 from .bundled_models import find_model
 from .convolutions import use_onednn
@@ -98,6 +99,8 @@ class Predictor:
     Attributes:
         module: the TorchScript module.
         record: what the model file says about itself: ``working_size``, ``metrics``, ``recipe``...
+        guarantee: what is known of the regions that the model predicts, with repair, for maps like
+            those that it was calibrated on; None where it was not. Every such heat map has it.
         inference_threads: CPU threads for one prediction. More than one rarely helps at the
             working size, and takes ten times as long where other work has the cores.
 
@@ -126,6 +129,7 @@ class Predictor:
         whole_number("working_size", record.get("working_size", 0), 1, MAX_IMAGE_SIZE)
         self.module = module
         self.record = record
+        self.guarantee = Guarantee.from_record(record)
         self.inference_threads = 1
         self._graphs = TorchGraphs(module)
         self._pipeline = make_pipeline(self._graphs)
@@ -234,7 +238,10 @@ class Predictor:
         heatmaps = [_make_heatmap(values, grid) for values in outputs]
         if not repair:
             return heatmaps
-        return [connect(heatmap, pair) for heatmap, pair in zip(heatmaps, pixels, strict=True)]
+        heatmaps = [connect(heatmap, pair) for heatmap, pair in zip(heatmaps, pixels, strict=True)]
+        for heatmap in heatmaps:
+            heatmap.guarantee = self.guarantee
+        return heatmaps
 
     def probabilities(
         self, free: NDArray[np.bool_], start: NDArray[np.floating], goal: NDArray[np.floating]
