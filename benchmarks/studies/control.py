@@ -46,9 +46,10 @@ def main() -> None:
     parser.add_argument("--maps", nargs="+", metavar="MAP", help="files, or bundled:NAME")
     parser.add_argument("--tasks", metavar="FILE", help="tasks on the maps (CSV)")
     parser.add_argument("--tasks-per-map", type=int, default=1)
-    parser.add_argument("--count", type=int, default=8, help="tasks on generated maps")
+    parser.add_argument("--count", type=int, default=6, help="tasks on generated maps")
     parser.add_argument("--cars", default=",".join(CARS))
     parser.add_argument("--planners", default="RRT")
+    parser.add_argument("--samplers", default="OMPL's own,learned", help="also: positions only")
     parser.add_argument("--controls", type=int, help="that are tried for each sample (OMPL 1.7)")
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--time", type=float, default=2.0, help="CPU seconds of a run")
@@ -66,14 +67,15 @@ def main() -> None:
         for task in tasks:
             for car in args.cars.split(","):
                 for planner in args.planners.split(","):
-                    for sampler in SAMPLERS:
+                    for sampler in args.samplers.split(","):
                         key = (car, planner, sampler, task.name, seed)
                         if key not in known:
                             row = {"key": key, **measure(task, key, predictor, args)}
                             done.append(row)
                             with rows.open("a") as file:
                                 file.write(json.dumps(row) + "\n")
-    summary = summarise(done, args.time)
+    names = {task.name for task in tasks}
+    summary = summarise([row for row in done if row["key"][3] in names], args.time)
     for line in summary:
         print(line)
     if args.json is not None:
