@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import AbstractContextManager
 from os import PathLike
 from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,12 +20,16 @@ from ..maps.grid_search import prepare_search
 from ..networks.config import MAX_IMAGE_SIZE
 from ..robots.poses import position_map, position_of
 from ..robots.robot import Robot
+from ..sampling.bridges import connect
+from ..sampling.guarantee import Guarantee
 from ..sampling.heatmap import Heatmap
 from .bundled_models import find_model
+from .convolutions import use_onednn
+from .graphs import TorchGraphs
 from .model_files import load_script, read_model
+from .pipelines import KeptMaps, make_pipeline
 from .probe import Kind, try_model
-from .scaling import enlarged_values, scaled_map, scaled_shape
-from .torch_state import own_torch_state
+from .scaling import scaled_map, scaled_shape
 
 if TYPE_CHECKING:
     import torch
@@ -68,7 +74,9 @@ def load_model(path: str | PathLike[str] | None = None) -> Predictor:
     if not model.is_listed:
         try_model(str(source), model.script, Kind.REGION, model.record["working_size"])
     try:
-        predictor = Predictor(load_script(model.script), model.record)
+        module = load_script(model.script)
+        use_onednn(module)
+        predictor = Predictor(module, model.record)
         predictor.warm_up()
         prepare_search(with_costs=True)  # for regions that have to be connected
     except ModelError as error:
@@ -91,6 +99,8 @@ class Predictor:
     Attributes:
         module: the TorchScript module.
         record: what the model file says about itself: ``working_size``, ``metrics``, ``recipe``...
+        guarantee: what is known of the regions that the model predicts, with repair, for maps like
+            those that it was calibrated on; None where it was not. Every such heat map has it.
         inference_threads: CPU threads for one prediction. More than one rarely helps at the
             working size, and takes ten times as long where other work has the cores.
 
@@ -119,7 +129,11 @@ class Predictor:
         whole_number("working_size", record.get("working_size", 0), 1, MAX_IMAGE_SIZE)
         self.module = module
         self.record = record
+        self.guarantee = Guarantee.from_record(record)
         self.inference_threads = 1
+        self._graphs = TorchGraphs(module)
+        self._pipeline = make_pipeline(self._graphs)
+        self._kept: WeakKeyDictionary[GridMap, KeptMaps] = WeakKeyDictionary()
 
     def warm_up(self) -> None:
         """Predict for an empty map, since the first call takes up to four times as long.
@@ -218,13 +232,16 @@ class Predictor:
         tasks = [grid.check_task(*task) for task in zip(starts, goals, strict=True)]
         shape = scaled_shape(grid.shape, int(self.record["working_size"]))
         scale = shape[1] / grid.width, shape[0] / grid.height
-        endpoints = grid.to_pixel(np.array(tasks)) * scale
-        free = np.broadcast_to(scaled_map(grid, shape), (len(tasks), *shape))
-        outputs = self.probabilities(free, endpoints[:, 0], endpoints[:, 1])
+        pixels = grid.to_pixel(np.array(tasks))
+        maps, endpoints = self._read_grid(grid, shape), pixels * scale
+        outputs = self._run(maps, endpoints[:, 0], endpoints[:, 1])
         heatmaps = [_make_heatmap(values, grid) for values in outputs]
         if not repair:
             return heatmaps
-        return [heatmap.connected(*task) for heatmap, task in zip(heatmaps, tasks, strict=True)]
+        heatmaps = [connect(heatmap, pair) for heatmap, pair in zip(heatmaps, pixels, strict=True)]
+        for heatmap in heatmaps:
+            heatmap.guarantee = self.guarantee
+        return heatmaps
 
     def probabilities(
         self, free: NDArray[np.bool_], start: NDArray[np.floating], goal: NDArray[np.floating]
@@ -242,27 +259,43 @@ class Predictor:
         Raises:
             ModelError: there is not enough memory.
         """
-        import torch
+        return self._run(self._read_maps(free), start, goal)
 
-        cells = torch.from_numpy(free.astype(np.float32))[:, None]
-        endpoints = (torch.from_numpy(points.astype(np.float32)) for points in (start, goal))
-        with (
-            translate_lack_of_memory(
-                ModelError,
-                f"to predict for cells of shape {tuple(cells.shape)}",
-                "give it fewer at a time, or take a model with a smaller working size",
-            ),
-            own_torch_state(self.inference_threads),
-        ):
-            values = self.module(cells, *endpoints)
-            result: NDArray[np.float32] = values[:, 0].numpy()
-        return result
+    def _read_grid(self, grid: GridMap, shape: tuple[int, int]) -> KeptMaps:
+        """Return a map at a size as the network has read it; a second task does not pay for it."""
+        kept = self._kept.get(grid)
+        if kept is None or kept.shape != shape:
+            kept = self._kept[grid] = self._read_maps(scaled_map(grid, shape)[None])
+        return kept
+
+    def _read_maps(self, free: NDArray[np.bool_]) -> KeptMaps:
+        with _translate_lack_of_memory(free.shape), self._graphs.ready():
+            return self._pipeline.read_maps(free)
+
+    def _run(
+        self, maps: KeptMaps, start: NDArray[np.floating], goal: NDArray[np.floating]
+    ) -> NDArray[np.float32]:
+        """Return the probabilities for tasks on maps, (B, H, W)."""
+        self._graphs.threads = self.inference_threads
+        shape = len(start), *maps.shape
+        with _translate_lack_of_memory(shape), self._graphs.ready():
+            return self._pipeline.probabilities(
+                maps, start.astype(np.float32), goal.astype(np.float32)
+            )
 
     def __repr__(self) -> str:
         return (
             f"Predictor({self.record.get('name')!r}, "
             f"working size {self.record['working_size']} pixels)"
         )
+
+
+def _translate_lack_of_memory(shape: tuple[int, ...]) -> AbstractContextManager[None]:
+    return translate_lack_of_memory(
+        ModelError,
+        f"to predict for maps of shape {shape}",
+        "give it fewer at a time, or take a model with a smaller working size",
+    )
 
 
 def _list_points(name: str, points: Iterable[ArrayLike]) -> list[ArrayLike]:
@@ -275,7 +308,7 @@ def _list_points(name: str, points: Iterable[ArrayLike]) -> list[ArrayLike]:
 
 def _make_heatmap(values: NDArray[np.float32], grid: GridMap) -> Heatmap:
     """Return the heat map of a network's output."""
-    full = enlarged_values(values, grid.shape, _LEAST_VALUE)
-    if not np.logical_and(full > 0, grid.free).any():
-        full[:] = _FLOOR
-    return Heatmap(full, grid)
+    from ..sampling.painting import paint_heatmap  # here, since numba takes long to import
+
+    painted = paint_heatmap(values, grid, _LEAST_VALUE)
+    return painted or Heatmap(np.full(grid.shape, _FLOOR, np.float32), grid)

@@ -6,17 +6,19 @@ import shutil
 import warnings
 from pathlib import Path
 
+import numpy as np
 import pytest
 from helpers.tiny_model import TINY
 
 torch = pytest.importorskip("torch")
 
-from cbagan_ompl import ConfigError, ModelError
+from cbagan_ompl import ConfigError, GridMap, ModelError
 from cbagan_ompl.inference import model_files
 from cbagan_ompl.inference.predictor import load_model
 from cbagan_ompl.networks.export_model import RegionModel
+from cbagan_ompl.training.cards import is_card, model_card
 from cbagan_ompl.training.checkpoints import best_generator, load_checkpoint
-from cbagan_ompl.training.export import _is_card, export, model_card
+from cbagan_ompl.training.export import export
 from cbagan_ompl.training.loop import train
 from cbagan_ompl.training.task_sources import DatasetSource
 
@@ -95,9 +97,16 @@ def test_a_second_export_keeps_the_default(checkpoint: Path, tmp_path: Path) -> 
     assert load_model(tmp_path / "second.pt").record["name"] == "second"
 
 
-def test_export_of_what_is_no_checkpoint(exported: Path, tmp_path: Path) -> None:
-    with pytest.raises(ModelError, match="an exported model, not a training checkpoint"):
-        export(exported, tmp_path / "new.pt")
+def test_an_exported_model_is_written_anew(exported: Path, tmp_path: Path) -> None:
+    record = export(exported, tmp_path / "new.pt")
+    before = model_files.read_record(exported)
+    assert record == {**before, "name": "new", "date": record["date"]}
+    grid, task = GridMap(np.ones((32, 32))), ((3, 4), (28, 20))
+    old, new = (load_model(path).predict(grid, *task) for path in (exported, tmp_path / "new.pt"))
+    np.testing.assert_allclose(new.values, old.values, atol=1e-4)
+
+
+def test_export_of_what_is_no_checkpoint(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match="no such file"):
         export(tmp_path / "none.pt", tmp_path / "new.pt")
 
@@ -144,4 +153,4 @@ def test_names_that_a_model_cannot_have(checkpoint: Path, tmp_path: Path, stem: 
 def test_cards_of_the_repository_are_known_as_cards() -> None:
     cards = sorted((Path(__file__).parents[2] / "models").glob("*.md"))
     assert cards
-    assert all(map(_is_card, cards))
+    assert all(map(is_card, cards))
