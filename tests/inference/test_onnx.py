@@ -15,7 +15,7 @@ pytest.importorskip("onnx")
 pytest.importorskip("onnxruntime")
 
 from helpers.damaged_archives import damaged_members
-from helpers.fuzzing import mutations
+from helpers.fuzzing import mutations, read_all
 
 from cbagan_ompl import GridMap, MissingDependencyError, ModelError, Predictor, load_model
 from cbagan_ompl.inference.bundled_models import find_model
@@ -182,13 +182,13 @@ def test_no_damage_ends_the_process(onnx_file: Path, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_crafted_graphs_are_refused_or_work(onnx_file: Path, tmp_path: Path) -> None:
-    for i, data in enumerate(damaged_members(onnx_file.read_bytes(), 12, seed=3)):
-        path = tmp_path / f"{i}.onnx"
+    def read(data: bytes) -> None:
+        path = tmp_path / "crafted.onnx"
         path.write_bytes(data)
-        try:
-            load_model(path)
-        except ModelError as error:
-            assert len(str(error)) < 1000
+        load_model(path)
+
+    counts = read_all(read, damaged_members(onnx_file.read_bytes(), 12, seed=3))
+    assert counts["refused"]
 
 
 def test_weights_are_recovered_from_torchscript_alone(onnx_file: Path) -> None:
