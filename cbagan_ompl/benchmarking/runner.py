@@ -122,7 +122,7 @@ class _RunningJob:
     """
 
     def __init__(self, job: Job, folder: Path) -> None:
-        learned = {LEARNED, AUTO} & set(job.settings.samplers) or job.settings.models
+        learned = {LEARNED, AUTO} & job.settings.sources or job.settings.models
         context = fork_server([*_PRELOAD, *(_PRELOAD_LEARNED if learned else ())])
         self.job = job
         self.rounds_left = job.settings.runs

@@ -34,6 +34,7 @@ SAMPLERS = {
     UNIFORM: "OMPL's own, untouched",
     CORRIDOR: "a band around the path of a grid search",
     "straight-line": "a band around the straight line from start to goal",
+    "flat": "a heat map that is 1 on all free space",
     AUTO: "learned or corridor, whichever is there sooner on a map of this size",
 }
 
@@ -140,4 +141,5 @@ def _on_grid(heatmap: Heatmap | ArrayLike, grid: GridMap) -> Heatmap:
 _CONTROLS: dict[str, HeatmapSource] = {
     CORRIDOR: Heatmap.corridor,
     "straight-line": Heatmap.straight_line,
+    "flat": lambda grid, *_: Heatmap.uniform(grid),
 }

@@ -95,6 +95,7 @@ class Heatmap:
         self.heading = None if heading is None else check_headings(heading, grid)
         self.guarantee: Guarantee | None = None
         self._support = support
+        self._last_connected: tuple[object, bool] = None, False  # a pair of pixels, the answer
 
     @classmethod
     def load(cls, path: str | PathLike[str], grid: GridMap) -> Heatmap:
@@ -216,7 +217,9 @@ class Heatmap:
         if not self.grid.is_free(endpoints).all():
             return False
         pixels = pixel_pair(self.grid.to_pixel(endpoints))
-        return in_one_component(self.region, *pixels, connectivity=4)
+        if self._last_connected[0] != pixels:
+            self._last_connected = pixels, in_one_component(self.region, *pixels, connectivity=4)
+        return self._last_connected[1]
 
     def connected(self, start: ArrayLike, goal: ArrayLike) -> Heatmap:
         """Return this heat map with a region that connects start and goal.

@@ -373,7 +373,7 @@ def test_sql_in_a_log_is_refused(
 @pytest.mark.slow
 def test_damaged_folders_are_read_or_refused(finished: Finished, tmp_path: Path) -> None:
     """What is made of logs and settings that pass the checks must not fail any more."""
-    tasks = select_tasks([finished.arguments[1]], finished.arguments[7])
+    tasks = select_tasks([finished.arguments[1]], finished.arguments[7]).tasks
     settings = Settings(
         ("RRT", "RRTstar"), ("uniform", "corridor"), 3, 0.1, 10.0, {"RRTstar": {"goal_bias": 0.1}}
     )
@@ -540,7 +540,7 @@ def test_a_task_that_needs_no_path(map_folder: Path, tmp_path: Path) -> None:
 
 
 def test_logs_are_those_of_their_task(finished: Finished) -> None:
-    tasks = select_tasks([finished.arguments[1]], finished.arguments[7])
+    tasks = select_tasks([finished.arguments[1]], finished.arguments[7]).tasks
     settings = Settings(
         ("RRT", "RRTstar"), ("uniform", "corridor"), 3, 0.1, 10.0, {"RRTstar": {"goal_bias": 0.1}}
     )
