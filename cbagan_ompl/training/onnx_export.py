@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import warnings
 import zipfile
 from collections.abc import Sequence
@@ -132,6 +133,7 @@ def _export(
         sizes = enumerate(zip(first.shape, second.shape, strict=True))
         axes[names[-1]] = [axis for axis, (size, next_size) in sizes if size != next_size]
     count = len(flatten(one[0]))
+    torch.onnx.register_custom_op_symbolic("aten::exp2", _exp2, _OPSET)  # type: ignore[attr-defined]
     buffer = io.BytesIO()
     with warnings.catch_warnings(), torch.no_grad():
         # The exporter warns of itself, and of sizes that become constants: none that differ.
@@ -147,3 +149,9 @@ def _export(
             dynamo=False,
         )
     return buffer.getvalue()
+
+
+def _exp2(graph: Any, exponent: Any) -> Any:
+    """Return 2 to the power of a value of a graph: ONNX has the exponential function of base e."""
+    factor = graph.op("Constant", value_t=torch.tensor(math.log(2)))
+    return graph.op("Exp", graph.op("Mul", exponent, factor))
