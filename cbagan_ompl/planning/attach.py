@@ -10,12 +10,6 @@ from typing import Any
 
 from ..errors import PlannerError
 from ..sampling.adaptation import AdaptiveMixture
-from ..sampling.budget import (
-    ADVANCE_WITH_TREE,
-    EARNED_BY_UNIFORM_UNSEEN,
-    EARNED_BY_UNIFORM_WITH_TREE,
-    LearnedBudget,
-)
 from ..sampling.checks import check_heatmap
 from ..sampling.headings import HeadingSampler
 from ..sampling.heatmap import Heatmap
@@ -37,12 +31,12 @@ from .hooks import (
     hook_of,
     keeps_sampler,
     samples_are_nodes,
-    stops_at_first,
     wants_sharp,
 )
 from .monitor import PlannerMonitor, is_informed, release_forgotten
 from .pose_headings import with_headings
-from .states import StateAccess, drives_backwards, position_bounds, state_access
+from .sample_budget import budget_of
+from .states import StateAccess, drives_backwards, pose_space, position_bounds, state_access
 from .steered_callbacks import install_steering
 
 # OMPL's range of a planner that was given none, as a fraction of the extent of the space.
@@ -208,12 +202,16 @@ def attach(
     headings = HeadingSampler(heatmap, options.heading, rng, drives_backwards(space))
     states = state_access(space, headings)
     monitor = _MONITORS.get(hook, PlannerMonitor)(setup, states)
-    budget = _budget_of(planner, name, hook) if options.adaptation.stagnation else None
+    adaptation, budget = options.adaptation, None
+    if adaptation.stagnation:
+        budget = budget_of(planner, sees_nodes=hook in _MONITORS)
+    if pose_space(space) is not None:  # what is no progress in position may be one in heading
+        adaptation = replace(adaptation, stagnation=False)
     mixture: AdaptiveMixture | RoadmapMixture | None = None
     if hook in _MONITORS:  # callbacks see the tree
         reach = _reach_of(planner)
-        mixture = AdaptiveMixture(heatmap, options.adaptation, reach, monitor, budget)
-    elif samples_are_nodes(name) and options.adaptation.coverage:
+        mixture = AdaptiveMixture(heatmap, adaptation, reach, monitor, budget)
+    elif samples_are_nodes(name) and adaptation.coverage:
         mixture = RoadmapMixture(heatmap, _reach_of(planner), budget)
     sampler = HeatmapSampler(heatmap, replace(options, seed=rng), monitor, mixture, budget)
     sampler.keep_inside(*position_bounds(space))
@@ -243,14 +241,6 @@ def _reach_of(planner: Any) -> float:
     si = planner.getSpaceInformation()
     range = planner.getRange() if hasattr(planner, "getRange") else 0.0
     return _REACH * float(range or _OMPL_RANGE * si.getMaximumExtent())
-
-
-def _budget_of(planner: Any, name: str, hook: str) -> LearnedBudget:
-    if hook in _MONITORS:
-        return LearnedBudget(EARNED_BY_UNIFORM_WITH_TREE, advance=ADVANCE_WITH_TREE)
-    if stops_at_first(name) or hasattr(planner, "bestCost"):
-        return LearnedBudget()
-    return LearnedBudget(EARNED_BY_UNIFORM_UNSEEN, is_halved=False)
 
 
 @dataclass(frozen=True)

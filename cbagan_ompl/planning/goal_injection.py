@@ -7,6 +7,7 @@ from typing import Any
 
 from ..sampling.sampler import HeatmapSampler
 from .compat import ob
+from .goal_approach import goal_approach
 from .goal_monitor import GoalMonitor
 from .states import StateAccess
 
@@ -47,6 +48,7 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
         self._states = states
         self._sampler = sampler
         self._monitor = monitor
+        self._approach = goal_approach(si.getStateSpace(), sampler)
 
     def distanceGoal(self, state: Any) -> float:  # noqa: N802
         """Return the distance to the original goal; planners ask it for every new node."""
@@ -88,6 +90,9 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
             self._sampler.begin()
         if not sampling or (not monitor.has_solution and self._is_goals_turn()):
             self._original.sampleGoal(state)
+        elif not monitor.has_solution and self._approach is not None and self._approach.is_due():
+            self._original.sampleGoal(state)
+            self._approach.move_back(state)
         else:
             self._states.write(state, *self._sampler.next())
 
