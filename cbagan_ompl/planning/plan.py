@@ -31,6 +31,7 @@ from .compat import ou
 from .goals import heatmap_of_goals, reached_goal, set_goals, split_goals
 from .heatmap_sources import (
     LEARNED,
+    OWN_HEATMAP,
     UNIFORM,
     HeatmapSource,
     heatmap_source,
@@ -220,8 +221,11 @@ def _run(job: _Job) -> PlanResult:
     began = perf_counter()
     heatmap, attachment = None, None
     if job.make_heatmap is not None:
+        source = job.make_heatmap
+        if job.sampler != OWN_HEATMAP:
+            source = job.workspace.adapt(source)
         heatmap = heatmap_of_goals(
-            job.make_heatmap, job.workspace.grid, job.start[:2], [goal[:2] for goal in job.goals]
+            source, job.workspace.grid, job.start[:2], [goal[:2] for goal in job.goals]
         )
         attachment = attach(setup, heatmap, job.options)
     inference_s = perf_counter() - began if attachment else 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -17,6 +18,8 @@ from ..maps.grid_map import GridMap
 from ..robots.poses import check_poses, position_map, snap_poses
 from ..robots.robot import Robot
 from ..robots.shape_checker import ShapeChecker
+from ..sampling.heatmap import Heatmap
+from ..sampling.robot_heatmaps import robot_heatmap
 from . import compat
 from .robot_validity import RobotMotionValidator, RobotValidityChecker
 from .states import read_pose
@@ -73,6 +76,19 @@ class Workspace:
                     "x, y alone, or a robot with a shape or a turning radius"
                 )
         return self.grid.check_task(start, goal)
+
+    def adapt(
+        self, source: Callable[[GridMap, ArrayLike, ArrayLike], Heatmap]
+    ) -> Callable[[GridMap, ArrayLike, ArrayLike], Heatmap]:
+        """Return a source of heat maps that looks for ways on which the robot fits.
+
+        Args:
+            source: makes the heat map of a point on a map.
+
+        Returns:
+            The same for the robot, on :attr:`grid`, whichever map it is given.
+        """
+        return lambda _, start, goal: robot_heatmap(source, self.source, self.robot, start, goal)
 
     def snap(self, start: ArrayLike, goal: ArrayLike, distance: float) -> tuple[Endpoints, Moves]:
         """Return start and goal, each moved to the nearest place where the robot may be.
