@@ -43,7 +43,10 @@ class RegionModel(nn.Module):
     def padded(self, free: Tensor) -> Tensor:
         """Return a map with blocked pixels to the right and below, up to the stride."""
         right, below = -free.size(3) % self.stride, -free.size(2) % self.stride
-        return functional.pad(free, [0, right, 0, below]) if right > 0 or below > 0 else free
+        # A graph for ONNX is traced: it has no branches.
+        if torch.jit.is_scripting() and right == 0 and below == 0:  # type: ignore[attr-defined]
+            return free
+        return functional.pad(free, [0, right, 0, below])
 
 
 class SplitModel(RegionModel):
@@ -200,8 +203,9 @@ class PatchModel(nn.Module):
         features = self.white_features.repeat(batch * size, 1, 1, 1)
         # The first cell of each window: those around the starts, then those around the goals.
         corners = ((torch.cat((start, goal)) - self.reach) / self.cell).floor()
-        left = corners[:, :1].clamp(0.0, float(width - self.window))
-        top = corners[:, 1:].clamp(0.0, float(height - self.window))
+        corners = corners.clamp(min=0.0)
+        left = torch.minimum(corners[:, :1], torch.full_like(corners[:, :1], width - self.window))
+        top = torch.minimum(corners[:, 1:], torch.full_like(corners[:, 1:], height - self.window))
         shift = self.cell * torch.cat((left, top), 1)
         windows = point_image(start.repeat(2, 1) - shift, goal.repeat(2, 1) - shift, side, side)
         window_features = self.point_stem(tiles_of(windows, self.cell))

@@ -11,8 +11,21 @@ from ..sampling.budget import (
     EARNED_BY_UNIFORM_WITH_TREE,
     LearnedBudget,
 )
-from .hooks import class_name, stops_at_first
+from .hooks import stops_at_first
+from .planner_kinds import class_name, plans_controls
 from .states import pose_space
+
+
+def needs_many_poses(planner: Any) -> bool:
+    """Return whether a planner steers to samples of poses, of which many have a heading in vain.
+
+    Planners of controls only choose by a sample from where to go on.
+
+    Args:
+        planner: an OMPL planner.
+    """
+    space = planner.getSpaceInformation().getStateSpace()
+    return pose_space(space) is not None and not plans_controls(planner)
 
 
 def budget_of(planner: Any, sees_nodes: bool) -> LearnedBudget:
@@ -22,7 +35,7 @@ def budget_of(planner: Any, sees_nodes: bool) -> LearnedBudget:
         planner: an OMPL planner.
         sees_nodes: whether the hook that reaches it sees the nodes of its tree.
     """
-    if pose_space(planner.getSpaceInformation().getStateSpace()) is not None:
+    if needs_many_poses(planner):
         return LearnedBudget(EARNED_BY_UNIFORM_POSE, is_halved=False)
     if sees_nodes:
         return LearnedBudget(EARNED_BY_UNIFORM_WITH_TREE, advance=ADVANCE_WITH_TREE)

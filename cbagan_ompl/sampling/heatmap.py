@@ -16,7 +16,6 @@ from ..maps.connectivity import in_one_component
 from ..maps.endpoints import check_point
 from ..maps.grid_map import GridMap
 from ..maps.grid_search import pull_taut, shortest_path
-from ..robots.poses import position_of
 from ..robots.robot import Robot
 from .bands import half_width, paint_band
 from .bridges import connect
@@ -69,6 +68,8 @@ class Heatmap:
         (3, 2)
     """
 
+    _last_connected: tuple[object, bool] = None, False  # a pair of pixels, and the answer
+
     def __init__(self, values: ArrayLike, grid: GridMap, heading: ArrayLike | None = None) -> None:
         check_grid(grid, HeatmapError)
         try:
@@ -96,7 +97,6 @@ class Heatmap:
         self.heading = None if heading is None else check_headings(heading, grid)
         self.guarantee: Guarantee | None = None
         self._support = support
-        self._last_connected: tuple[object, bool] = None, False  # a pair of pixels, the answer
 
     @classmethod
     def load(cls, path: str | PathLike[str], grid: GridMap) -> Heatmap:
@@ -186,7 +186,6 @@ class Heatmap:
         """
         check_grid(grid, HeatmapError)
         if robot is not None:
-            start, goal = position_of(robot, "start", start), position_of(robot, "goal", goal)
             return robot_heatmap(cls.corridor, grid, robot, start, goal)
         endpoints = grid.to_pixel(grid.check_task(start, goal))
         pixels = shortest_path(grid.free, *pixel_pair(endpoints))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from numpy.typing import ArrayLike
 
 from ..maps.grid_map import GridMap
-from ..robots.poses import passable_map, position_map
+from ..robots.poses import passable_map, position_map, position_of
 from ..robots.robot import Robot
 
 if TYPE_CHECKING:
@@ -28,8 +28,12 @@ def robot_heatmap(
         source: makes the heat map of a point.
         grid: the map.
         robot: what moves. The source looks for a way on its :func:`.poses.passable_map`.
-        start: (x, y), world.
-        goal: (x, y), world.
+        start: (x, y), world, or a pose for a robot with heading.
+        goal: the same.
+
+    Raises:
+        RobotError: no robot.
+        TaskError: an endpoint that is none, or see :meth:`.GridMap.check_task`.
 
     Example:
         >>> from cbagan_ompl import Heatmap
@@ -38,9 +42,9 @@ def robot_heatmap(
         >>> heatmap.grid.name
         'rooms (inflated by 1.58579)'
     """
-    return on_positions(
-        source(passable_map(grid, robot, start, goal), start, goal), position_map(grid, robot)
-    )
+    start, goal = position_of(robot, "start", start), position_of(robot, "goal", goal)
+    heatmap = source(passable_map(grid, robot, start, goal), start, goal)
+    return on_positions(heatmap, position_map(grid, robot))
 
 
 def on_positions(heatmap: Heatmap, positions: GridMap) -> Heatmap:

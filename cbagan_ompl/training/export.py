@@ -23,6 +23,7 @@ from ..inference.model_files import (
     MAX_NAME_LENGTH,
     RECORD_MEMBER,
     RECORD_SCHEMA,
+    ModelFormat,
     is_model,
     read_manifest,
     read_record,
@@ -34,6 +35,7 @@ from ..sampling.guarantee import RECORD_KEY, Guarantee
 from .cards import MAX_CARD_BYTES, is_card, model_card, with_guarantee
 from .checkpoints import best_generator, load_checkpoint
 from .model_weights import recover_generator
+from .onnx_export import save_onnx
 from .torchscript import save_script
 
 INPUTS = (
@@ -51,7 +53,7 @@ def export(
     note: str = "",
     force: bool = False,
 ) -> dict[str, Any]:
-    """Write the generator of a checkpoint as a TorchScript file with its record.
+    """Write the generator of a checkpoint with its record, as TorchScript or as ONNX.
 
     Beside the file go a model card (the same name with suffix ``.md``) and its line in
     ``manifest.json``, which names the default model and the SHA-256 of each.
@@ -59,7 +61,8 @@ def export(
     Args:
         checkpoint: a file that :func:`cbagan_ompl.training.loop.train` wrote; or an exported model,
             whose weights are recovered, to write it in the form of this version.
-        path: the file to write; its suffix is ``.pt``.
+        path: the file to write; its suffix is ``.pt`` for TorchScript, which torch computes, or
+            ``.onnx`` for ONNX graphs, which ONNX Runtime does.
         note: what the checkpoint cannot tell, for the record and the card: the origin of the data,
             and the licences of data and model.
         force: write over files of these names that no export wrote.
@@ -72,8 +75,9 @@ def export(
             or a name that is too long or not printable; or a file would be lost.
     """
     target = as_path(path, ModelError)
-    if target.suffix != ".pt":
-        raise ModelError(f"{target}: the name of an exported model ends in .pt")
+    formats = {kind.suffix: kind for kind in ModelFormat}
+    if target.suffix not in formats:
+        raise ModelError(f"{target}: the name of an exported model ends in {' or '.join(formats)}")
     if not target.stem.isprintable() or len(target.stem) > MAX_NAME_LENGTH:
         raise ModelError(
             f"a model cannot be called {show(target.stem)}: its name is printable and has at most "
@@ -82,11 +86,17 @@ def export(
     generator, record = _read_source(Path(checkpoint), target.stem, note)
     make_folder(target.parent, ModelError)
     _check_outputs(target, as_path(checkpoint), force)
-    model = make_region_model(generator)
-    # Convolutions in this layout take four fifths of the time on a CPU.
-    model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
-    save_script(model, target, record)
-    write_atomically(target.with_suffix(".md"), model_card(record), ModelError)
+    model, card = make_region_model(generator), target.with_suffix(".md")
+    is_onnx = formats[target.suffix] is ModelFormat.ONNX
+    if is_onnx:
+        save_onnx(model, target, record)
+    else:
+        # Convolutions in this layout take four fifths of the time on a CPU.
+        model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        save_script(model, target, record)
+    # Both formats of a model have one card.
+    if not (is_onnx and is_card(card)):
+        write_atomically(card, model_card(record), ModelError)
     _update_manifest(target, force)
     return record
 
