@@ -14,6 +14,8 @@ import argparse
 from collections.abc import Callable
 from pathlib import Path
 
+from calibrate import calibration_table, files_table
+from inference_speed import speed_table as speed_of_models
 from planner_tables import Json, ratios_table
 from search_speed import speed_table
 from suite_tables import (
@@ -284,6 +286,9 @@ TABLES: dict[str, Callable[[], str]] = {
     "networks": networks,
     "paper_tables": paper_tables,
     "replanning": replanning,
+    "calibration": lambda: calibration_table(read("calibration.json")),
+    "calibration_real_maps": lambda: files_table(read("calibration.json")),
+    "inference_speed": lambda: speed_of_models(read("inference_speed.json")),
     "search_speed": lambda: speed_table(read("search_speed.json")),
 }
 
