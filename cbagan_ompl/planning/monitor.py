@@ -6,22 +6,25 @@ import atexit
 import gc
 import sys
 import weakref
-from collections.abc import Sequence
 from math import inf
 from threading import get_ident
 from time import perf_counter
 from types import CodeType, FrameType
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from ..errors import PlannerError
 from ..sampling.heatmap import Heatmap
 from ..sampling.informed_set import InformedSet
+from .awaited import AwaitedHeatmap
 from .compat import best_cost, new_state, ob, planner_data, start_states, typed_state
 from .solution_cost import SolutionCost
 from .solve_watch import SolveWatch
 from .states import StateAccess, is_distance_bound
+
+# Positions (x, y).
+_Points: TypeAlias = list[tuple[float, float]]
 
 # A goal region without end is represented by this many samples of it in the informed set.
 _MAX_GOALS = 100
@@ -54,9 +57,12 @@ class PlannerMonitor:
         self._cost = SolutionCost(self._problem) if tells_cost else None
         self.injected_goal: Any = None
         self.injected_fraction = 1.0
+        # Endpoints of which it is known whether the heat map connects them.
+        self._known: tuple[object, bool] = None, False
         self._call: tuple[CodeType, int, int] | None = None
         self._paths_at_call = 0
         self._watches: list[SolveWatch] = []
+        self._awaited: AwaitedHeatmap | None = None
 
     def note_call(self, caller: FrameType) -> None:
         """Note that OMPL asks for a sample, for :meth:`is_planning`.
@@ -121,14 +127,9 @@ class PlannerMonitor:
 
     def connects(self, heatmap: Heatmap) -> bool:
         """Return whether a region connects a start with a goal, once planning has begun."""
-        endpoints = self._endpoints()
-        if not len(endpoints.goals):
-            return True  # a goal that has no samples yet can be anywhere
-        return any(
-            heatmap.connects(start, goal) for start in endpoints.starts for goal in endpoints.goals
-        )
+        return self._connects(heatmap, self._starts(), self._goals())
 
-    def prepare(self, heatmap: Heatmap, starts: Sequence[tuple[float, float]]) -> None:
+    def prepare(self, heatmap: Heatmap, starts: _Points) -> None:
         """Find out beforehand what :meth:`connects` will ask, where the task is a plain one.
 
         Args:
@@ -136,7 +137,15 @@ class PlannerMonitor:
             starts: positions of the start states.
         """
         if len(starts) == 1 and isinstance(self._goal, ob.GoalState):
-            heatmap.connects(starts[0], self._goals()[0])
+            self._connects(heatmap, starts, self._goals())
+
+    def _connects(self, heatmap: Heatmap, starts: _Points, goals: _Points) -> bool:
+        if not goals:
+            return True  # a goal that has no samples yet can be anywhere
+        if self._known[0] != (starts, goals):
+            found = any(heatmap.connects(start, goal) for start in starts for goal in goals)
+            self._known = (starts, goals), found
+        return self._known[1]
 
     def node_count(self) -> int:
         """Return the number of nodes of the tree."""
@@ -148,11 +157,29 @@ class PlannerMonitor:
         if self._planner is not None:
             self._planner.setGoalBias(fraction)
 
-    def register(self) -> None:
-        """Let :func:`is_monitored` and the interpreter's exit know of this monitor."""
+    @property
+    def setup(self) -> Any:
+        """The setup of the planner; None once it was let go of."""
+        return self._setup
+
+    def node_positions(self) -> list[tuple[float, float]]:
+        """Return the (x, y) of the nodes of the planner's tree, world."""
+        if self._planner is None:
+            return []
+        data, read = planner_data(self._planner), self._states.read
+        return [read(data.getVertex(i).getState()) for i in range(data.numVertices())]
+
+    def register(self, awaited: AwaitedHeatmap | None = None) -> None:
+        """Let :func:`is_monitored` and the interpreter's exit know of this monitor.
+
+        Args:
+            awaited: the heat map that is waited for, whose failure a solve raises at its end.
+        """
         _alive.add(self)
+        self._awaited = awaited
         targets = [one for one in (self._setup, self._planner) if hasattr(one, "solve")]
-        self._watches = [SolveWatch(target, self.check_goal) for target in targets]
+        after = _do_nothing if awaited is None else awaited.raise_failure
+        self._watches = [SolveWatch(target, self.check_goal, after) for target in targets]
 
     def check_goal(self) -> None:
         """Raise if the goal was replaced: the planner would sample nothing but the new one.
@@ -195,14 +222,20 @@ class PlannerMonitor:
         for watch in self._watches:
             watch.release()
         self._watches = []
+        if self._awaited is not None:
+            self._awaited.release()
         self._planner = self._problem = self._goal = self._setup = self._call = None
         self._cost = self.injected_goal = None
 
     def _endpoints(self) -> InformedSet:
-        starts = [self._states.read(start) for start in start_states(self._planner)]
-        return InformedSet(np.array(starts), np.array(self._goals()), self._goal.getThreshold())
+        starts, goals = np.array(self._starts()), np.array(self._goals())
+        return InformedSet(starts, goals, self._goal.getThreshold())
 
-    def _goals(self) -> list[tuple[float, float]]:
+    def _starts(self) -> _Points:
+        """Return positions of the start states, once the planner has begun to plan."""
+        return [self._states.read(start) for start in start_states(self._planner)]
+
+    def _goals(self) -> _Points:
         """Return positions of goal states, sampled from the goal."""
         state = new_state(self._planner.getSpaceInformation().getStateSpace())
         typed = typed_state(state)
@@ -254,6 +287,10 @@ def release_forgotten() -> None:
     for monitor in list(_alive):
         if monitor.is_forgotten():
             monitor.release()
+
+
+def _do_nothing() -> None:
+    pass
 
 
 _alive: weakref.WeakSet[PlannerMonitor] = weakref.WeakSet()
