@@ -8,7 +8,12 @@ from torch.nn import functional
 
 from .encoding import SPOT_RADIUS, map_image, point_image, region_probability
 from .generator import Generator
+from .passage_generator import PassageGenerator
+from .passages import endpoint_nodes
 from .patch_generator import PatchGenerator, endpoint_cells
+
+#: The generators.
+AnyGenerator = Generator | PatchGenerator | PassageGenerator
 
 
 class RegionModel(nn.Module):
@@ -37,12 +42,117 @@ class RegionModel(nn.Module):
             goal: (B, 2), the same.
         """
         height, width = free.size(2), free.size(3)
-        # Blocked pixels to the right and below pad to the stride and are cut off again.
-        right, below = -width % self.stride, -height % self.stride
-        if right > 0 or below > 0:
-            free = functional.pad(free, [0, right, 0, below])
-        probability: Tensor = self.model(free, start, goal)
+        # Blocked pixels pad to the stride and are cut off again.
+        probability: Tensor = self.model(pad_to_stride(free, self.stride), start, goal)
         return probability[:, :, :height, :width]
+
+
+class PassageModel(nn.Module):
+    """A :class:`PassageGenerator` without its images, in parts that can be called by themselves.
+
+    What :meth:`encode` returns depends on the map alone, and :meth:`distances` has no weights: a
+    caller may keep the one and compute the other by compiled code
+    (:mod:`cbagan_ompl.networks.fast_marching`).
+
+    Args:
+        generator: with its trained weights, in evaluation mode.
+    """
+
+    def __init__(self, generator: PassageGenerator) -> None:
+        super().__init__()
+        self.generator = generator
+        self.stride = generator.stride
+        self.map_stem = _make_free_stem(generator.map_stem)
+        no_noise = generator.noise_stem(torch.zeros(1, 1, generator.cell, generator.cell))
+        self.no_noise = nn.Parameter(no_noise.detach(), requires_grad=False)
+
+    def forward(self, free: Tensor, start: Tensor, goal: Tensor) -> Tensor:
+        """Return the probability of the region, as :meth:`RegionModel.forward`."""
+        features, costs, codes = self.encode(free)
+        distances, towards = self.distances(costs, codes, start, goal)
+        return self.paint(features, costs, codes, distances, towards, free)[0]
+
+    @torch.jit.export
+    def encode(self, free: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Return features, costs and codes of the patches of a map.
+
+        Args:
+            free: (B, 1, H, W) in [0, 1], 1 where free, of any size.
+
+        Returns:
+            (B, stem, h, w), (B, 3, h, w) and (B, 3, h, w) int32, see :class:`PassageGenerator`; of
+            h x w patches, in which the map is padded to the stride.
+        """
+        free = pad_to_stride(free, self.stride)
+        map_features = torch.relu(self.map_stem(tiles_of(free, 4))).permute(0, 3, 1, 2)
+        features, costs = self.generator.encode(map_features, self.no_noise)
+        return features, costs, self.generator.codes(free)
+
+    @torch.jit.export
+    def distances(
+        self, costs: Tensor, codes: Tensor, start: Tensor, goal: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """Return the distances from start and goal, and the directions in which the latter fall.
+
+        Both are (B, 2, 3, h, w), see :mod:`.passages`.
+
+        Args:
+            costs: from :meth:`encode`.
+            codes: the same.
+            start: (B, 2), pixel coordinates (u, v).
+            goal: (B, 2), the same.
+        """
+        nodes = endpoint_nodes(start, codes), endpoint_nodes(goal, codes)
+        return self.generator.distances(costs, codes, nodes[0], nodes[1])
+
+    @torch.jit.export
+    def paint(
+        self,
+        features: Tensor,
+        costs: Tensor,
+        codes: Tensor,
+        distances: Tensor,
+        towards: Tensor,
+        free: Tensor,
+    ) -> tuple[Tensor, Tensor]:
+        """Return the probability of the region, and the directions of travel.
+
+        Args:
+            features: from :meth:`encode`.
+            costs: the same.
+            codes: the same.
+            distances: from :meth:`distances`.
+            towards: the same.
+            free: (B, 1, H, W), as for :meth:`encode`.
+
+        Returns:
+            (B, 1, H, W) in [0, 1], and (B, 2, h, w): unit vectors (u, v), v down, of each patch; 0
+            where no path leads.
+        """
+        height, width = free.size(2), free.size(3)
+        region, direction = self.generator.paint(
+            features, costs, codes, distances, towards, pad_to_stride(free, self.stride)
+        )
+        return region[:, :, :height, :width], direction
+
+
+def export_module(generator: AnyGenerator) -> RegionModel | PassageModel:
+    """Return the module that an exported file holds.
+
+    Args:
+        generator: with its trained weights, in evaluation mode.
+    """
+    if isinstance(generator, PassageGenerator):
+        return PassageModel(generator)
+    return RegionModel(generator)
+
+
+def pad_to_stride(free: Tensor, stride: int) -> Tensor:
+    """Return maps with blocked pixels to the right and below, up to multiples of a stride."""
+    right, below = -free.size(3) % stride, -free.size(2) % stride
+    if right > 0 or below > 0:
+        return functional.pad(free, [0, right, 0, below])
+    return free
 
 
 class ImageModel(nn.Module):

@@ -9,7 +9,11 @@ from .attention import Attention
 from .config import MAX_WEIGHTS, NetworkConfig
 from .discriminator import Discriminator
 from .generator import Generator
+from .passage_generator import PassageGenerator
 from .patch_generator import PatchGenerator
+
+#: The generators.
+AnyGenerator = Generator | PatchGenerator | PassageGenerator
 
 
 def check_weights(config: NetworkConfig) -> None:
@@ -33,7 +37,7 @@ def check_weights(config: NetworkConfig) -> None:
         )
 
 
-def make_generator(config: NetworkConfig) -> Generator | PatchGenerator:
+def make_generator(config: NetworkConfig) -> AnyGenerator:
     """Return the generator of a configuration.
 
     Example:
@@ -43,6 +47,8 @@ def make_generator(config: NetworkConfig) -> Generator | PatchGenerator:
     attention = attention_of(config)
     if config.patch == 1:
         return Generator(config.widths, attention, config.stem, config.noise_stem)
+    if config.passages:
+        return PassageGenerator(config.widths, attention, config.stem, config.white_obstacles)
     return PatchGenerator(
         config.widths,
         attention,

@@ -1,0 +1,343 @@
+"""The distances of :mod:`.passages`, compiled, with their gradients. Needs numba.
+
+The nodes are visited in about the order of their distance, as in fast marching: J. A. Sethian, "A
+fast marching level set method for monotonically advancing fronts", PNAS 93(4), 1996,
+https://doi.org/10.1073/pnas.93.4.1591. The queue has buckets, and a node whose distance falls is
+visited again, so that the result does not depend on the width of the buckets.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+from numba import njit
+from numpy.typing import NDArray
+from torch import Tensor
+
+_UNREACHED = np.float32(1e4)
+_BUCKETS = 128
+_BUCKET_WIDTH = 0.25
+
+
+class FastMarching(torch.autograd.Function):
+    """Distances of all nodes from start and goal, with gradients by the costs, and directions.
+
+    Takes the same as :func:`.passages.distance_fields`, and returns its distances, as far as they
+    are of use (up to ``reach`` times the distance between the endpoints, and 4 more), and what
+    :func:`.passages.directions` returns for those from the goal.
+    """
+
+    @staticmethod
+    def forward(  # type: ignore[override]
+        ctx: Any, costs: Tensor, codes: Tensor, start: Tensor, goal: Tensor, reach: float
+    ) -> tuple[Tensor, Tensor]:
+        """Return the distances and the directions."""
+        cost_values = costs.detach().float().contiguous().numpy()
+        linked = link_bits(codes.numpy())
+        distances = march_all(cost_values, linked, start.numpy(), goal.numpy(), reach)
+        ctx.values = cost_values, linked, distances
+        towards = torch.from_numpy(descent_directions(distances[:, 1], linked))
+        ctx.mark_non_differentiable(towards)
+        return torch.from_numpy(distances), towards
+
+    @staticmethod
+    def backward(ctx: Any, gradient: Tensor, _: Tensor) -> tuple[Tensor | None, ...]:  # type: ignore[override]
+        """Return the gradient by the costs."""
+        cost_values, linked, distances = ctx.values
+        result = np.zeros_like(cost_values)
+        flat = gradient.contiguous().numpy()
+        height, width = cost_values.shape[2:]
+        for task in range(len(cost_values)):
+            for field in range(2):
+                values = distances[task, field].ravel()
+                order = np.argsort(values)[::-1]
+                _descend(
+                    cost_values[task].ravel(),
+                    linked[task].ravel(),
+                    values,
+                    order,
+                    flat[task, field].ravel().copy(),
+                    result[task].ravel(),
+                    height,
+                    width,
+                )
+        return torch.from_numpy(result), None, None, None, None
+
+
+def march_all(
+    costs: NDArray[np.float32],
+    linked: NDArray[np.uint16],
+    start: NDArray[np.int64],
+    goal: NDArray[np.int64],
+    reach: float,
+) -> NDArray[np.float32]:
+    """Return the distances of several tasks.
+
+    Args:
+        costs: (B, 3, h, w), see :func:`.passages.distance_fields`; contiguous.
+        linked: (B, 3, h, w), see :func:`link_bits`.
+        start: (B,), see :func:`.passages.endpoint_nodes`.
+        goal: (B,), the same.
+        reach: see :class:`FastMarching`.
+
+    Returns:
+        (B, 2, 3, h, w).
+    """
+    batch, nodes, height, width = costs.shape
+    distances = np.full((batch, 2, nodes, height, width), _UNREACHED, np.float32)
+    for task in range(batch):
+        for field in range(2):
+            source, target = (start, goal) if field == 0 else (goal, start)
+            _march(
+                costs[task].ravel(),
+                linked[task].ravel(),
+                int(source[task]),
+                int(target[task]),
+                np.float32(reach),
+                distances[task, field].ravel(),
+                width,
+            )
+    return distances
+
+
+@njit(cache=True)
+def link_bits(codes: NDArray[np.int32]) -> NDArray[np.uint16]:  # pragma: no cover
+    """Return the links of each node as bits.
+
+    Args:
+        codes: (B, 3, h, w), see :func:`.passages.patch_codes`.
+
+    Returns:
+        (B, 3, h, w): bit 3 * direction + node is 1 where this node of the neighbouring patch is
+        linked; directions are left, right, above, below.
+    """
+    batch, nodes, height, width = codes.shape
+    linked = np.zeros(codes.shape, np.uint16)
+    for task in range(batch):
+        for here in range(nodes):
+            for row in range(height):
+                for column in range(width):
+                    code = codes[task, here, row, column]
+                    if code == 0:
+                        continue
+                    for there in range(nodes):
+                        if column + 1 < width:
+                            other = codes[task, there, row, column + 1]
+                            if ((code & 0x8888) >> 3) & other:
+                                linked[task, here, row, column] |= 1 << (3 + there)
+                                linked[task, there, row, column + 1] |= 1 << here
+                        if row + 1 < height:
+                            other = codes[task, there, row + 1, column]
+                            if ((code & 0xF000) >> 12) & other:
+                                linked[task, here, row, column] |= 1 << (9 + there)
+                                linked[task, there, row + 1, column] |= 1 << (6 + here)
+    return linked
+
+
+@njit(cache=True)
+def descent_directions(
+    to_goal: NDArray[np.float32], linked: NDArray[np.uint16]
+) -> NDArray[np.float32]:  # pragma: no cover
+    """Return the directions of steepest descent, see :func:`.passages.directions`.
+
+    Args:
+        to_goal: (B, 3, h, w), the distances from the goal.
+        linked: (B, 3, h, w), see :func:`link_bits`.
+
+    Returns:
+        (B, 2, 3, h, w): unit vectors (u, v), v down; 0 where nothing is known.
+    """
+    batch, nodes, height, width = to_goal.shape
+    result = np.zeros((batch, 2, nodes, height, width), np.float32)
+    nearest = np.empty(4, np.float32)
+    for task in range(batch):
+        for node in range(nodes):
+            for row in range(height):
+                for column in range(width):
+                    value, bits = to_goal[task, node, row, column], linked[task, node, row, column]
+                    if bits == 0 or value >= _UNREACHED:
+                        continue
+                    nearest[:] = _UNREACHED
+                    for direction in range(4):
+                        for part in range(nodes):
+                            if (bits >> (3 * direction + part)) & 1:
+                                y = row + (direction == 3) - (direction == 2)
+                                x = column + (direction == 1) - (direction == 0)
+                                other = to_goal[task, part, y, x]
+                                nearest[direction] = min(nearest[direction], other)
+                    u = max(value - min(nearest[0], nearest[1]), np.float32(0))
+                    v = max(value - min(nearest[2], nearest[3]), np.float32(0))
+                    length = np.sqrt(u * u + v * v)
+                    if length > 0:
+                        result[task, 0, node, row, column] = (
+                            -u if nearest[0] < nearest[1] else u
+                        ) / length
+                        result[task, 1, node, row, column] = (
+                            -v if nearest[2] < nearest[3] else v
+                        ) / length
+    return result
+
+
+@njit(cache=True)
+def _pair_min(
+    values: NDArray[np.float32], bits: int, cells: int, first: int, second: int
+) -> np.float32:  # pragma: no cover
+    """Return the least distance of the linked nodes of two patches.
+
+    Args:
+        values: of all nodes.
+        bits: of the links, those of the two patches in the six lowest.
+        cells: number of patches.
+        first: index of the first patch.
+        second: index of the second one.
+    """
+    best = _UNREACHED
+    for part in range(3):
+        if (bits >> part) & 1:
+            best = min(best, values[part * cells + first])
+        if (bits >> (3 + part)) & 1:
+            best = min(best, values[part * cells + second])
+    return best
+
+
+@njit(cache=True)
+def _march(
+    costs: NDArray[np.float32],
+    linked: NDArray[np.uint16],
+    source: int,
+    target: int,
+    reach: np.float32,
+    values: NDArray[np.float32],
+    width: int,
+) -> None:  # pragma: no cover
+    """Find the distances from a node, in place."""
+    cells = len(costs) // 3
+    capacity = 1024
+    nodes = np.empty(capacity, np.int32)
+    following = np.empty(capacity, np.int32)
+    heads = np.full(_BUCKETS, -1, np.int32)
+    queued = np.full(len(costs), -1, np.int32)
+    steps = np.array((-1, 1, -width, width))
+    unused, used, waiting = -1, 1, 1
+    values[source] = 0
+    nodes[0], following[0], heads[0], queued[source] = source, -1, 0, 0
+    number, limit = 0, np.float32(1e30)
+    while waiting > 0 and number * _BUCKET_WIDTH <= limit:
+        entry = heads[number % _BUCKETS]
+        if entry < 0:
+            number += 1
+            continue
+        heads[number % _BUCKETS] = following[entry]
+        node = nodes[entry]
+        following[entry], unused = unused, entry
+        waiting -= 1
+        if queued[node] != number:
+            continue  # it is in an earlier bucket, or was
+        queued[node] = -1
+        value = values[node]
+        if node == target:
+            limit = reach * value + 4
+        cell = node % cells
+        bits = linked[node]
+        for direction in range(4):
+            there = (bits >> (3 * direction)) & 7
+            if there == 0:
+                continue
+            other = cell + steps[direction]
+            for part in range(3):
+                if not (there >> part) & 1:
+                    continue
+                neighbour = other + part * cells
+                cost = costs[neighbour]
+                if values[neighbour] <= value:
+                    continue
+                if direction < 2:
+                    side = _pair_min(
+                        values, linked[neighbour] >> 6, cells, other - width, other + width
+                    )
+                else:
+                    side = _pair_min(values, linked[neighbour], cells, other - 1, other + 1)
+                difference = abs(value - side)
+                if difference < cost:
+                    new = (value + side + np.sqrt(2 * cost * cost - difference * difference)) / 2
+                else:
+                    new = min(value, side) + cost
+                new = np.float32(new)
+                if new >= values[neighbour] - 1e-5:
+                    continue
+                values[neighbour] = new
+                bucket = max(number, int(new / _BUCKET_WIDTH))
+                if queued[neighbour] == bucket:
+                    continue
+                queued[neighbour] = bucket
+                if unused >= 0:
+                    entry = unused
+                    unused = following[entry]
+                else:
+                    if used == capacity:
+                        nodes = np.concatenate((nodes, np.empty(capacity, np.int32)))
+                        following = np.concatenate((following, np.empty(capacity, np.int32)))
+                        capacity *= 2
+                    entry = used
+                    used += 1
+                nodes[entry] = neighbour
+                following[entry] = heads[bucket % _BUCKETS]
+                heads[bucket % _BUCKETS] = entry
+                waiting += 1
+
+
+@njit(cache=True)
+def _descend(
+    costs: NDArray[np.float32],
+    linked: NDArray[np.uint16],
+    values: NDArray[np.float32],
+    order: NDArray[np.int64],
+    gradient: NDArray[np.float32],
+    result: NDArray[np.float32],
+    height: int,
+    width: int,
+) -> None:  # pragma: no cover
+    """Add the gradient by the costs, from the farthest node to the nearest.
+
+    Args:
+        costs: of all nodes.
+        linked: see :func:`link_bits`.
+        values: the distances.
+        order: of the nodes, farthest first.
+        gradient: by the distances; changed.
+        result: gradient by the costs, added in place.
+        height: of the map, in patches.
+        width: of the map, in patches.
+    """
+    cells = height * width
+    steps = np.array((-1, 1, -width, width))
+    parents = np.empty(2, np.int64)
+    for node in order:
+        if gradient[node] == 0 or values[node] >= _UNREACHED or values[node] == 0:
+            continue
+        bits, cell = linked[node], node % cells
+        parents[:] = -1
+        for direction in range(4):
+            for part in range(3):
+                if (bits >> (3 * direction + part)) & 1:
+                    other = cell + steps[direction] + part * cells
+                    axis = direction // 2
+                    if parents[axis] < 0 or values[other] < values[parents[axis]]:
+                        parents[axis] = other
+        cost, slope = costs[node], gradient[node]
+        if parents[0] >= 0 and parents[1] >= 0:
+            across, along = values[parents[0]], values[parents[1]]
+            if abs(across - along) < cost:
+                u, v = values[node] - across, values[node] - along
+                total = u + v
+                gradient[parents[0]] += slope * u / total
+                gradient[parents[1]] += slope * v / total
+                result[node] += slope * cost / total
+                continue
+            nearer = 0 if across < along else 1
+        else:
+            nearer = 0 if parents[0] >= 0 else 1
+        gradient[parents[nearer]] += slope
+        result[node] += slope
