@@ -92,9 +92,9 @@ class PassageModel(nn.Module):
     def distances(
         self, costs: Tensor, codes: Tensor, start: Tensor, goal: Tensor
     ) -> tuple[Tensor, Tensor]:
-        """Return the distances from start and goal, and the directions in which the latter fall.
+        """Return the distances from start and goal, and the directions in which they fall.
 
-        Both are (B, 2, 3, h, w), see :mod:`.passages`.
+        See :mod:`.passages`: (B, 2, 3, h, w) and (B, 2, 2, 3, h, w).
 
         Args:
             costs: from :meth:`encode`.

@@ -26,7 +26,7 @@ class FastMarching(torch.autograd.Function):
 
     Takes the same as :func:`.passages.distance_fields`, and returns its distances, as far as they
     are of use (up to ``reach`` times the distance between the endpoints, and 4 more), and what
-    :func:`.passages.directions` returns for those from the goal.
+    :func:`.passages.directions` returns for them.
     """
 
     @staticmethod
@@ -38,7 +38,7 @@ class FastMarching(torch.autograd.Function):
         linked = link_bits(codes.numpy())
         distances = march_all(cost_values, linked, start.numpy(), goal.numpy(), reach)
         ctx.values = cost_values, linked, distances
-        towards = torch.from_numpy(descent_directions(distances[:, 1], linked))
+        towards = torch.from_numpy(descent_directions(distances, linked))
         ctx.mark_non_differentiable(towards)
         return torch.from_numpy(distances), towards
 
@@ -138,45 +138,47 @@ def link_bits(codes: NDArray[np.int32]) -> NDArray[np.uint16]:  # pragma: no cov
 
 @njit(cache=True)
 def descent_directions(
-    to_goal: NDArray[np.float32], linked: NDArray[np.uint16]
+    distances: NDArray[np.float32], linked: NDArray[np.uint16]
 ) -> NDArray[np.float32]:  # pragma: no cover
     """Return the directions of steepest descent, see :func:`.passages.directions`.
 
     Args:
-        to_goal: (B, 3, h, w), the distances from the goal.
+        distances: (B, 2, 3, h, w), see :func:`march_all`.
         linked: (B, 3, h, w), see :func:`link_bits`.
 
     Returns:
-        (B, 2, 3, h, w): unit vectors (u, v), v down; 0 where nothing is known.
+        (B, 2, 2, 3, h, w): unit vectors (u, v), v down; 0 where nothing is known.
     """
-    batch, nodes, height, width = to_goal.shape
-    result = np.zeros((batch, 2, nodes, height, width), np.float32)
-    nearest = np.empty(4, np.float32)
+    batch, fields, nodes, height, width = distances.shape
+    result = np.zeros((batch, fields, 2, nodes, height, width), np.float32)
+    near = np.empty(4, np.float32)
     for task in range(batch):
-        for node in range(nodes):
-            for row in range(height):
-                for column in range(width):
-                    value, bits = to_goal[task, node, row, column], linked[task, node, row, column]
-                    if bits == 0 or value >= _UNREACHED:
-                        continue
-                    nearest[:] = _UNREACHED
-                    for direction in range(4):
-                        for part in range(nodes):
-                            if (bits >> (3 * direction + part)) & 1:
-                                y = row + (direction == 3) - (direction == 2)
-                                x = column + (direction == 1) - (direction == 0)
-                                other = to_goal[task, part, y, x]
-                                nearest[direction] = min(nearest[direction], other)
-                    u = max(value - min(nearest[0], nearest[1]), np.float32(0))
-                    v = max(value - min(nearest[2], nearest[3]), np.float32(0))
-                    length = np.sqrt(u * u + v * v)
-                    if length > 0:
-                        result[task, 0, node, row, column] = (
-                            -u if nearest[0] < nearest[1] else u
-                        ) / length
-                        result[task, 1, node, row, column] = (
-                            -v if nearest[2] < nearest[3] else v
-                        ) / length
+        for field in range(fields):
+            values = distances[task, field]
+            for node in range(nodes):
+                for row in range(height):
+                    for column in range(width):
+                        value, bits = values[node, row, column], linked[task, node, row, column]
+                        if bits == 0 or value >= _UNREACHED:
+                            continue
+                        near[:] = _UNREACHED
+                        for direction in range(4):
+                            y = row + (direction == 3) - (direction == 2)
+                            x = column + (direction == 1) - (direction == 0)
+                            for part in range(nodes):
+                                if (bits >> (3 * direction + part)) & 1:
+                                    near[direction] = min(near[direction], values[part, y, x])
+                        u = max(value - min(near[0], near[1]), np.float32(0))
+                        v = max(value - min(near[2], near[3]), np.float32(0))
+                        length = np.sqrt(u * u + v * v)
+                        if length > 0:
+                            u, v = u / length, v / length
+                            result[task, field, 0, node, row, column] = (
+                                -u if near[0] < near[1] else u
+                            )
+                            result[task, field, 1, node, row, column] = (
+                                -v if near[2] < near[3] else v
+                            )
     return result
 
 

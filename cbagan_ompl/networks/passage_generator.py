@@ -24,7 +24,7 @@ from .passages import (
 )
 
 # Features that the distances of a patch give, see PassageGenerator.paint.
-_DISTANCE_FEATURES = 8
+_DISTANCE_FEATURES = 12
 
 
 class PassageGenerator(nn.Module):
@@ -38,8 +38,9 @@ class PassageGenerator(nn.Module):
 
         e = (T - T*) / (0.05 (T* + 1) + 0.25),
 
-    for which 2^-e is the label that the networks are trained with, had all costs been right. What
-    is painted in a node does not reach the others of its patch, on the other side of a wall.
+    for which 2^-e is the label that the networks are trained with, had all costs been right. Within
+    a patch e changes as the distances do. What is painted in a node does not reach the others of
+    its patch, on the other side of a wall.
 
     Args:
         widths: channels of the stages down; the stages up mirror them.
@@ -77,6 +78,10 @@ class PassageGenerator(nn.Module):
         self.head = nn.Linear(stem, PATCH**2 + 2)
         self.gain = nn.Parameter(torch.ones(1))
         self.register_buffer("table", component_table(), persistent=False)
+        # Of the pixels of a patch from its centre, in patches: (2, 16), to the right and down.
+        offsets = (torch.arange(PATCH) + 0.5) / PATCH - 0.5
+        grid = torch.stack((offsets.repeat(PATCH), offsets.repeat_interleave(PATCH)))
+        self.register_buffer("offsets", grid, persistent=False)
         with torch.no_grad():  # begin with equal costs, and the region that they give
             self.costs.weight.mul_(0.1)
             self.head.weight.mul_(0.1)
@@ -130,14 +135,14 @@ class PassageGenerator(nn.Module):
     def distances(
         self, costs: Tensor, codes: Tensor, start: Tensor, goal: Tensor
     ) -> tuple[Tensor, Tensor]:
-        """Return the distances of all nodes, and the directions in which those to the goal fall.
+        """Return the distances of all nodes, and the directions in which they fall.
 
-        See :mod:`.passages`: (B, 2, 3, h, w) both.
+        See :mod:`.passages`: (B, 2, 3, h, w) and (B, 2, 2, 3, h, w), from start and goal.
         """
         if not torch.jit.is_scripting():
             return _march(costs, codes, start, goal)
         fields = distance_fields(costs, codes, start, goal, self.rounds)
-        return fields, directions(fields[:, 1], codes)
+        return fields, directions(fields, codes)
 
     def paint(
         self,
@@ -164,9 +169,14 @@ class PassageGenerator(nn.Module):
         # Both distances count the cost of the node itself.
         through = distances.sum(1) - costs
         best = through.amin((1, 2, 3), keepdim=True)
-        excess = ((through - best) / (0.05 * (best + 1.0) + 0.25)).clamp(0.0, 12.0)
+        unit = 0.05 * (best + 1.0) + 0.25
+        excess = ((through - best) / unit).clamp(0.0, 12.0)
         least, node = excess.min(1, keepdim=True)
-        towards = towards.gather(2, node.unsqueeze(1).expand(-1, 2, -1, -1, -1)).squeeze(2)
+        size = [-1, 4, -1, -1, -1]
+        towards = towards.flatten(1, 2).gather(2, node.unsqueeze(1).expand(size)).squeeze(2)
+        to_goal = towards[:, 2:]
+        cost = costs.gather(1, node)
+        slope = (towards[:, :2] + to_goal) * (-cost / unit)
         known = distances[:, 0].gather(1, node)
         logits = _label_logit(excess)
         own = logits.gather(1, node)
@@ -179,31 +189,32 @@ class PassageGenerator(nn.Module):
                 (known / (best + 1.0)).clamp(0.0, 2.0),
                 0.1 * (best + 1.0).log2().expand_as(least),
                 towards,
-                0.5 * costs.gather(1, node).log(),
+                slope,
+                0.5 * cost.log(),
             ),
             1,
         )
         # With the channels last a linear layer is a 1x1 convolution, and faster.
         painted = self.head(self.fuse(inputs).permute(0, 2, 3, 1)).float()
-        tiles = painted[..., :16] + self.gain * own.permute(0, 2, 3, 1)
+        within = torch.matmul(slope.permute(0, 2, 3, 1), self.offsets)
+        pixels = least.permute(0, 2, 3, 1) + within
+        tiles = painted[..., :16] + self.gain * _label_logit(pixels)
         # What the other nodes of a patch are worse.
         worse = (logits - own) * (codes > 0)
         if bool((worse < 0).any()):
             bits = torch.arange(16, dtype=torch.int32, device=codes.device)
-            pixels = ((codes.unsqueeze(4) >> bits) & 1).float()
-            tiles = tiles + (pixels * worse.unsqueeze(4)).sum(1)
+            members = ((codes.unsqueeze(4) >> bits) & 1).float()
+            tiles = tiles + (members * worse.unsqueeze(4)).sum(1)
         batch, height, width = tiles.size(0), tiles.size(1), tiles.size(2)
         tiles = torch.sigmoid(tiles).view(batch, height, width, 4, 4).transpose(2, 3)
         region = tiles.reshape(free.size())
-        vectors = painted[..., 16:].permute(0, 3, 1, 2) + towards
+        vectors = painted[..., 16:].permute(0, 3, 1, 2) + to_goal
         vectors = unit_vectors(vectors) * (distances[:, 1].gather(1, node) < 1e4)
         return (region * free if self.white_obstacles else region), vectors
 
 
 @torch.jit.unused
-def _march(
-    costs: Tensor, codes: Tensor, start: Tensor, goal: Tensor
-) -> tuple[Tensor, Tensor]:
+def _march(costs: Tensor, codes: Tensor, start: Tensor, goal: Tensor) -> tuple[Tensor, Tensor]:
     """Return the distances with gradients, and the directions."""
     # Here, since numba is optional and compiles on first use.
     from .fast_marching import FastMarching

@@ -196,27 +196,26 @@ def distance_fields(
         return distance.transpose(0, 1).contiguous()
 
 
-def directions(to_goal: Tensor, codes: Tensor) -> Tensor:
+def directions(distance: Tensor, codes: Tensor) -> Tensor:
     """Return the directions of steepest descent.
 
     Args:
-        to_goal: (B, 3, h, w), the distances from the goal.
+        distance: (B, 2, 3, h, w), see :func:`distance_fields`.
         codes: (B, 3, h, w), see :func:`patch_codes`.
 
     Returns:
-        (B, 2, 3, h, w): unit vectors (u, v) of each node, v down: by coordinate and node; 0 where
-        no node beside it is nearer to the goal.
+        (B, 2, 2, 3, h, w): unit vectors (u, v), v down, by endpoint, coordinate and node; 0 where
+        no node beside it is nearer.
     """
-    near = nearest_neighbours(to_goal, links(codes))
-    across, along = torch.minimum(near[0], near[1]), torch.minimum(near[2], near[3])
+    fields = distance.transpose(0, 1)
+    near = nearest_neighbours(fields, links(codes))
     # Towards the nearer of both neighbours, as much as the distance falls.
-    u = (to_goal - across).clamp(min=0.0)
-    v = (to_goal - along).clamp(min=0.0)
+    u = (fields - torch.minimum(near[0], near[1])).clamp(min=0.0)
+    v = (fields - torch.minimum(near[2], near[3])).clamp(min=0.0)
     u = torch.where(near[0] < near[1], -u, u)
     v = torch.where(near[2] < near[3], -v, v)
-    vector = torch.stack((u, v), 1)
-    vector = torch.where((to_goal < 1e4).unsqueeze(1), vector, torch.zeros_like(vector))
-    return unit_vectors(vector)
+    vectors = torch.stack((u, v), 1).masked_fill((fields >= 1e4).unsqueeze(1), 0.0)
+    return unit_vectors(vectors.flatten(2)).view(vectors.shape).permute(2, 0, 1, 3, 4, 5)
 
 
 def unit_vectors(vectors: Tensor) -> Tensor:

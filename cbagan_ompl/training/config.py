@@ -265,7 +265,7 @@ RULES = {
 }
 
 # The architecture of the bundled model.
-_BUNDLED = NetworkConfig(widths=(32, 48, 64), patch=4, cost_maps=2, white_obstacles=True)
+_BUNDLED = NetworkConfig(widths=(24, 32), patch=4, passages=True, white_obstacles=True)
 
 #: ``synthetic`` is what the bundled model was trained with: for images of 256 pixels, with new maps
 #: in every epoch. ``refine`` goes on from it on a data set, for segmentation alone, on maps that
@@ -278,14 +278,14 @@ PRESETS: dict[str, TrainingConfig] = {
     "best": TrainingConfig(),
     "synthetic": TrainingConfig(
         network=_BUNDLED,
-        epochs=40,
+        epochs=16,
         batch_size=16,
         warmup=0.05,
         clip_norm=2.0,
-        adversarial_every=8,
+        adversarial_every=16,
         pixel_weight=4.0,
         dice_weight=2.0,
-        positive_weight=3.5,
+        positive_weight=1.5,
         scales=(1, 1, 1, 2),
         precision="bfloat16",
     ),
