@@ -1,11 +1,11 @@
-"""The speed of the grid search: compiled and by SciPy, and of the network beside it.
+"""The speed of the grid search, and of the network beside it.
 
     python scripts/search_speed.py --json benchmarks/results/search_speed.json
 
-On random maps of each size the two searches take turns on the same tasks: for the path alone, for
-the heat map ``corridor``, and for the repair of a heat map whose region is cut in two. ``learned``
-is the prediction of the bundled model. Times are those of the processor (one thread, so that other
-work does not count), medians over all tasks; a ratio is the median of the ratios on each task.
+On random maps of each size the rows take turns on the same tasks: the path alone, the heat map
+``corridor``, the repair of a heat map whose region is cut in two, and ``learned``, the prediction
+of the bundled model. Times are those of the processor (one thread, so that other work does not
+count), medians over all tasks; a ratio is the median of the ratios on each task.
 """
 
 from __future__ import annotations
@@ -16,18 +16,16 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from time import process_time
 from typing import Any
-from unittest.mock import patch
 
 import numpy as np
 
 from cbagan_ompl import GridMap, Heatmap, load_model
 from cbagan_ompl.common.markdown import table
 from cbagan_ompl.map_generators import MAP_GENERATORS
-from cbagan_ompl.maps import grid_search
-from cbagan_ompl.maps.grid_search import COMPILED, SCIPY, prepare_search, pull_taut, shortest_path
+from cbagan_ompl.maps.grid_search import prepare_search, shortest_path
 
 GENERATORS = ("offices", "caves", "clutter", "city", "halls", "blocked_cells")
-ROWS = ("path", "corridor", "repair")
+ROWS = ("path", "corridor", "repair", "learned")
 
 
 def main() -> None:
@@ -64,22 +62,13 @@ def measure(grid: GridMap, task: tuple[Any, Any], model: Any) -> dict[str, float
     """Return the milliseconds of each step of a task, and the lengths of the paths."""
     broken = cut_in_two(Heatmap.corridor(grid, *task), task)
     start, goal = (tuple(int(x) for x in point) for point in task)
-    values: dict[str, float] = {"learned": milliseconds(lambda: model.predict(grid, *task))}
-    for kind in (COMPILED, SCIPY):
-        with patch.object(grid_search, "_load_compiled", loader(kind)):
-            paths: list[Any] = []
-            values[f"path {kind}"] = milliseconds(
-                lambda paths=paths: paths.append(shortest_path(grid.free, start, goal))  # type: ignore[misc]
-            )
-            values[f"corridor {kind}"] = milliseconds(lambda: Heatmap.corridor(grid, *task))
-            values[f"repair {kind}"] = milliseconds(lambda: broken.connected(*task))
-            taut = pull_taut(grid.free, paths[0])
-            values[f"length {kind}"] = float(np.hypot(*np.diff(taut, axis=0).T).sum())
-    return values
-
-
-def loader(kind: str) -> Callable[[], Any]:
-    return grid_search._load_compiled if kind == COMPILED else lambda: None
+    work: dict[str, Callable[[], object]] = {
+        "path": lambda: shortest_path(grid.free, start, goal),
+        "corridor": lambda: Heatmap.corridor(grid, *task),
+        "repair": lambda: broken.connected(*task),
+        "learned": lambda: model.predict(grid, *task),
+    }
+    return {row: milliseconds(work[row]) for row in ROWS}
 
 
 def milliseconds(work: Callable[[], object], repeats: int = 3) -> float:
@@ -102,40 +91,24 @@ def cut_in_two(heatmap: Heatmap, task: tuple[Any, Any]) -> Heatmap:
 
 
 def summarize(times: list[dict[str, float]]) -> dict[str, Any]:
-    medians = {key: float(np.median([row[key] for row in times])) for key in times[0]}
-    ratios = {
-        row: float(np.median([t[f"{row} {SCIPY}"] / t[f"{row} {COMPILED}"] for t in times]))
-        for row in (*ROWS, "length")
-    }
-    learned = float(np.median([t["learned"] / t[f"corridor {COMPILED}"] for t in times]))
-    return {"ms": medians, "scipy_to_compiled": ratios, "learned_to_corridor": learned}
+    medians = {row: float(np.median([time[row] for time in times])) for row in ROWS}
+    ratio = float(np.median([time["learned"] / time["corridor"] for time in times]))
+    return {"ms": medians, "learned_to_corridor": ratio}
 
 
 def speed_table(result: Mapping[str, Any]) -> str:
     """Return the figures as Markdown; ``result`` is what ``--json`` writes."""
-    head = ["side", "path", "", "corridor", "", "repair", "", "learned", "learned / corridor"]
-    kinds = ["", *("compiled", "SciPy") * len(ROWS), "", ""]
-    rows = [kinds]
+    rows = []
     for size, summary in result["sizes"].items():
-        ms = summary["ms"]
-        cells = [f"{ms[f'{row} {kind}']:.3g}" for row in ROWS for kind in (COMPILED, SCIPY)]
-        ratio = f"{summary['learned_to_corridor']:.2f}"
-        rows.append([f"{size} px", *cells, f"{ms['learned']:.3g}", ratio])
-    return table(head, rows)
+        cells = [f"{summary['ms'][row]:.3g}" for row in ROWS]
+        rows.append([f"{size} px", *cells, f"{summary['learned_to_corridor']:.2f}"])
+    return table(["side", *ROWS, "learned / corridor"], rows)
 
 
 def print_rows(size: int, summary: dict[str, Any]) -> None:
-    ms, ratios = summary["ms"], summary["scipy_to_compiled"]
-    for row in ROWS:
-        print(
-            f"{size:5} px  {row:9} compiled {ms[f'{row} {COMPILED}']:8.2f} ms  "
-            f"SciPy {ms[f'{row} {SCIPY}']:8.1f} ms  ratio {ratios[row]:6.1f}"
-        )
-    print(
-        f"{size:5} px  learned {ms['learned']:.1f} ms, {summary['learned_to_corridor']:.2f} times "
-        f"the corridor; SciPy's paths {ratios['length']:.4f} times as long",
-        flush=True,
-    )
+    cells = ", ".join(f"{row} {summary['ms'][row]:.2f} ms" for row in ROWS)
+    ratio = summary["learned_to_corridor"]
+    print(f"{size:5} px: {cells}; learned / corridor {ratio:.2f}", flush=True)
 
 
 if __name__ == "__main__":

@@ -137,7 +137,7 @@ def main() -> None:
     parser.add_argument("--json", metavar="FILE")
     args = parser.parse_args()
     maps = args.maps or [f"bundled:{name}" for name in bundled_maps()]
-    tasks = select_tasks(maps, args.tasks, args.tasks_per_map)
+    tasks = select_tasks(maps, args.tasks, args.tasks_per_map).tasks
     model = load_model()
     drive(tasks[:1], model, 3, obstacles=False)  # first calls take longer
     result = {"ompl": ompl_version(), "tasks": len(tasks), "cycle_ms": CYCLE_MS, "step": STEP}

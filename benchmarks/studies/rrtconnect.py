@@ -50,7 +50,9 @@ def main() -> None:
     parser.add_argument("--sharpness", type=float, help="of the learned samples")
     parser.add_argument("--json", metavar="FILE")
     args = parser.parse_args()
-    tasks = select_tasks(args.maps, args.tasks) if args.maps else synthetic_tasks(args.synthetic)
+    tasks = (
+        select_tasks(args.maps, args.tasks).tasks if args.maps else synthetic_tasks(args.synthetic)
+    )
     runs = plan_all(tasks, load_model(args.model), args.runs, args.sharpness)
     costs = np.array([one.task.optimal_cost or np.nan for one in tasks])[:, None]
     result: dict[str, Any] = {"ompl": ompl_version(), "tasks": len(tasks), "runs": args.runs}

@@ -50,7 +50,7 @@ def main() -> None:
     parser.add_argument("--json", metavar="FILE")
     args = parser.parse_args()
     predictor = load_model(args.model)
-    tasks = select_tasks(args.maps, args.tasks)
+    tasks = select_tasks(args.maps, args.tasks).tasks
     regions, timings = predict_regions(predictor, tasks)
     timings["sagan_ms"] = sagan_ms(int(predictor.record["working_size"]))
     wrong = plan_with_wrong_heatmaps(predictor, tasks, args.runs)

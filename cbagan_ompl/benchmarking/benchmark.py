@@ -13,7 +13,7 @@ from ..errors import ConfigError
 from .database import write_database
 from .inputs import check_same, record_inputs
 from .logs import ExperimentLog, read_log
-from .measures import thresholds
+from .measures import AUTO_SOURCE, thresholds
 from .plots import save_plots
 from .remote import run_jobs_remotely
 from .report import Conditions, markdown, summary_json
@@ -136,6 +136,7 @@ def write_results(
     failures: Mapping[str, str],
     folder: Path,
     command: str,
+    left_out: Mapping[str, str] | None = None,
 ) -> str:
     """Write the database, the summary and the plots, each whole or not at all.
 
@@ -145,6 +146,7 @@ def write_results(
         failures: for each task that failed the end of its output.
         folder: where to write.
         command: command that repeats the benchmark.
+        left_out: why a task cannot be planned for, by its name.
 
     Returns:
         The report in Markdown.
@@ -160,10 +162,23 @@ def write_results(
         )
     write_database(logs, folder / "benchmark.db")
     results = results_of(logs, thresholds(settings.within))
-    hosts = Counter(log.host for log in logs)
-    conditions = Conditions(next(iter(versions)), len(logs), settings, failures, command, hosts)
+    conditions = Conditions(
+        next(iter(versions)),
+        len(logs),
+        settings,
+        failures,
+        command,
+        hosts=Counter(log.host for log in logs),
+        left_out=left_out or {},
+        auto=_count_values(logs, AUTO_SOURCE),
+    )
     write_json(folder / "summary.json", summary_json(results, conditions))
     report = markdown(results, conditions)
     write_atomically(folder / "summary.md", report)
     save_plots(logs, results, settings.within, folder)
     return report
+
+
+def _count_values(logs: Sequence[ExperimentLog], name: str) -> Counter[str]:
+    """Return how many logs have each value of a property."""
+    return Counter(log.parameters[name] for log in logs if name in log.parameters)

@@ -104,7 +104,7 @@ def model_files(settings: Settings) -> dict[str, Path]:
     from ..inference.bundled_models import find_model
 
     models: dict[str, str | None] = dict(settings.models)
-    if {LEARNED, AUTO} & set(settings.samplers) - set(models) - set(settings.heatmap_dirs):
+    if {LEARNED, AUTO} & settings.sources - set(models) - set(settings.heatmap_dirs):
         models[LEARNED] = None
     return {sampler: find_model(model) for sampler, model in models.items()}
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..common.figures import write_figure
 from ..common.text import one_line
 from .logs import GEOMETRIC, ExperimentLog, number
-from .measures import BEST_KNOWN, INFERENCE, NODES, logged_costs
+from .measures import BEST_KNOWN, FIRST_NODES, INFERENCE, NODES_ADDED, logged_costs
 from .plot_styles import Panels, Style, legend_handles, styles_of
 from .settings import BASELINE
 from .statistics import Results, Summary, within_key
@@ -39,7 +39,7 @@ class _Run:
     Attributes:
         costs: each better solution, (seconds with inference, cost in multiples of the best known).
         limit: time limit, seconds.
-        nodes: states of the tree or roadmap.
+        nodes: that the planner had added when it found its first path, or at its end.
     """
 
     costs: list[tuple[float, float]]
@@ -81,7 +81,7 @@ def save_plots(logs: Sequence[ExperimentLog], results: Results, within: int, fol
         "first_solution": _boxes_figure(
             runs, lambda run: run.first_solution, "first path with inference, s"
         ),
-        "nodes": _boxes_figure(runs, lambda run: run.nodes, "nodes"),
+        "nodes": _boxes_figure(runs, lambda run: run.nodes, "nodes to the first path"),
         "ratio_first_solution": _ratio_figure(
             results, "first_solution_total_s", "time to the first path"
         ),
@@ -109,7 +109,8 @@ def _collect_runs(logs: Sequence[ExperimentLog]) -> _Runs:
                 inference = float(run[INFERENCE])
                 points = planner.progress[i] if planner.progress else ()
                 costs = [(t + inference, c / best) for t, c in logged_costs(run, points)]
-                collected.append(_Run(costs, log.time_limit, float(run[NODES])))
+                nodes = float(run[FIRST_NODES] or run[NODES_ADDED])
+                collected.append(_Run(costs, log.time_limit, nodes))
     return runs
 
 

@@ -11,9 +11,12 @@ from ..common.markdown import table
 from ..common.text import one_line
 from .logs import HOSTS
 from .settings import BASELINE, Settings
-from .statistics import Interval, Results, Summary, within_key
+from .statistics import Interval, Results, Summary, nodes_key, within_key
 
-_EFFORT = {"final_cost": "final cost", "nodes": "nodes", "collision_checks": "checks"}
+# Tasks left out that the report names.
+_SHOWN_LEFT_OUT = 10
+
+_EFFORT = {"final_cost": "final cost", "collision_checks": "checks"}
 
 _NOTES = """\
 Medians over the tasks of the medians over the runs, with bootstrap 95 % intervals. Times are of
@@ -39,6 +42,8 @@ class Conditions:
         failures: for each task that failed the end of its output.
         command: command that repeats the benchmark.
         hosts: number of tasks that each host has run, by its name.
+        left_out: why a task cannot be planned for, by its name.
+        auto: number of tasks by the sampler that ``auto`` stood for.
     """
 
     ompl_version: str
@@ -47,6 +52,8 @@ class Conditions:
     failures: Mapping[str, str]
     command: str
     hosts: Mapping[str, int] = field(default_factory=dict)
+    left_out: Mapping[str, str] = field(default_factory=dict)
+    auto: Mapping[str, int] = field(default_factory=dict)
 
 
 def warn_of_hosts(hosts: Mapping[str, int]) -> str:
@@ -83,6 +90,8 @@ def summary_json(results: Results, conditions: Conditions) -> dict[str, Any]:
         "ompl_version": conditions.ompl_version,
         "tasks": conditions.tasks,
         "hosts": dict(conditions.hosts),
+        "auto": dict(conditions.auto),
+        "left_out": dict(conditions.left_out),
         "settings": conditions.settings.to_dict(),
         "failures": dict(conditions.failures),
         "command": conditions.command,
@@ -106,7 +115,9 @@ def markdown(results: Results, conditions: Conditions) -> str:
         f"OMPL {conditions.ompl_version}, {conditions.tasks} tasks, {settings.runs} runs of "
         f"each planner with each sampler on each, {settings.time:g} s a run.",
         f"    {conditions.command}",
-        *filter(None, [warn_of_hosts(conditions.hosts).capitalize()]),
+        *filter(
+            None, [_describe_sources(conditions), warn_of_hosts(conditions.hosts).capitalize()]
+        ),
         "## Results",
         _measures_table(results.overall, settings.within),
         _NOTES,
@@ -119,6 +130,8 @@ def markdown(results: Results, conditions: Conditions) -> str:
             "## Ratios by kind of map",
             _kinds_table(results.families, settings.within),
         ]
+    if conditions.left_out:
+        parts += ["## Tasks left out", *describe_left_out(conditions.left_out)]
     if conditions.failures:
         failed = conditions.failures.items()
         parts += ["## Tasks that failed"]
@@ -128,11 +141,41 @@ def markdown(results: Results, conditions: Conditions) -> str:
     return "\n\n".join(part.strip("\n") for part in parts) + "\n"
 
 
+def _describe_sources(conditions: Conditions) -> str:
+    """Return what ``auto`` stood for."""
+    return f"Auto: {_counted(conditions.auto)}." if conditions.auto else ""
+
+
+def _counted(counts: Mapping[str, int]) -> str:
+    """Return one name, or several, each with the number of its tasks."""
+    if len(counts) == 1:
+        return next(iter(counts))
+    return ", ".join(f"{name} ({count})" for name, count in sorted(counts.items()))
+
+
+def describe_left_out(left_out: Mapping[str, str]) -> list[str]:
+    """Return how many tasks were left out and why, and the first of them by name.
+
+    Example:
+        >>> print(*describe_left_out({"city_3": "start and goal are the same"}), sep="; ")
+        1 task that cannot be planned for was left out.; - city_3: start and goal are the same
+    """
+    count = len(left_out)
+    noun, verb = ("task", "was") if count == 1 else ("tasks", "were")
+    shown = list(left_out.items())[:_SHOWN_LEFT_OUT]
+    lines = [f"- {name}: {one_line(reason)}" for name, reason in shown]
+    if count > len(shown):
+        lines.append(f"- and {count - len(shown)} more, all named in `summary.json`")
+    return [f"{count} {noun} that cannot be planned for {verb} left out.", "\n".join(lines)]
+
+
 def _measures_table(summaries: Sequence[Summary], within: int) -> str:
     shown = {
         "inference_s": "inference, ms",
         "first_solution_s": "first solution, ms",
+        "nodes_to_first": "nodes to it",
         within_key(within): f"to {within} % of best, ms",
+        nodes_key(within): "nodes to it",
         "first_cost": "first cost",
         **_EFFORT,
     }
@@ -150,9 +193,11 @@ def _measures_table(summaries: Sequence[Summary], within: int) -> str:
 
 def _ratios_table(summaries: Sequence[Summary], within: int) -> str:
     shown = {
-        "first_solution_s": "first solution",
+        "nodes_to_first": "nodes to first solution",
+        "first_solution_s": "time to it",
         "first_solution_total_s": "with inference",
-        within_key(within): f"to {within} % of best",
+        nodes_key(within): f"nodes to {within} % of best",
+        within_key(within): "time to it",
         within_key(within, total=True): "with inference",
         **_EFFORT,
     }

@@ -17,7 +17,7 @@ from ..common.files import reason
 from ..common.parallel import fork_server, start_first, why_died
 from ..common.signals import interrupts_held
 from ..common.text import one_line
-from ..errors import ConfigError
+from ..errors import ConfigError, show
 from ..planning.heatmap_sources import AUTO, LEARNED
 from .worker import Job, UnwritableLogError, run_job
 
@@ -60,7 +60,11 @@ def run_jobs(jobs: Sequence[Job], processes: int, show_progress: bool = True) ->
         raise
     except OSError as error:
         place = f"{error.filename}: " if error.filename else ""
-        raise ConfigError(f"cannot run the tasks: {place}{reason(error)}") from error
+        hint = ""
+        if "AF_UNIX path too long" in str(error):  # of the sockets of multiprocessing
+            folder = show(tempfile.gettempdir())
+            hint = f": set TMPDIR to a folder with a shorter name than {folder}"
+        raise ConfigError(f"cannot run the tasks: {place}{reason(error)}{hint}") from error
 
 
 def _run_jobs(jobs: Sequence[Job], processes: int, show_progress: bool) -> dict[str, str]:
@@ -118,7 +122,7 @@ class _RunningJob:
     """
 
     def __init__(self, job: Job, folder: Path) -> None:
-        learned = {LEARNED, AUTO} & set(job.settings.samplers) or job.settings.models
+        learned = {LEARNED, AUTO} & job.settings.sources or job.settings.models
         context = fork_server([*_PRELOAD, *(_PRELOAD_LEARNED if learned else ())])
         self.job = job
         self.rounds_left = job.settings.runs

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any
@@ -15,6 +14,7 @@ from ..planning.heatmap_sources import LEARNED, UNIFORM
 from ..planning.planner_names import planner_name
 from ..robots.robot import Robot
 from ..sampling.options import SamplerOptions
+from .sampler_variants import SamplerVariant, parse_sampler
 
 #: OMPL's own sampler, which the others are compared with.
 BASELINE = UNIFORM
@@ -26,9 +26,6 @@ DEFAULT_WITHIN = 5
 #: limit, a day in seconds; largest threshold of a good path, percent.
 MAX_RUNS, MAX_TIME, MAX_WITHIN = 5000, 86400, 10_000
 
-# They name planners in OMPL's logs and series in plots, where a leading "_" would hide them.
-_SAMPLER_NAME = re.compile(r"[^\W_].{0,39}")
-
 
 @dataclass(frozen=True)
 class Settings:
@@ -37,7 +34,8 @@ class Settings:
     Attributes:
         planners: by OMPL's names; other spellings, such as ``RRT*``, are replaced by those.
         samplers: of :data:`cbagan_ompl.planning.heatmap_sources.SAMPLERS`, and the keys of
-            ``models`` and of ``heatmap_dirs``.
+            ``models`` and of ``heatmap_dirs``; each may change options, as in
+            ``"learned:adaptation=none"``, see :func:`.parse_sampler`.
         runs: number of runs of each planner with each sampler on each task.
         time: time limit of a run, seconds.
         range: longest edge of the planners that have this parameter, world units; by default
@@ -49,6 +47,8 @@ class Settings:
             for ``learned`` by default.
         heatmap_dirs: for some samplers the folder of their heat maps, one for each task.
         robot: what moves.
+        simplify: planners whose paths OMPL's path simplifier shortens after each run; its time
+            counts in the time to a good path.
         within: threshold of a good path, in percent above the best known cost: reports and plots
             show the time until a run gets there.
 
@@ -71,6 +71,7 @@ class Settings:
     models: Mapping[str, str] = field(default_factory=dict)
     heatmap_dirs: Mapping[str, str] = field(default_factory=dict)
     robot: Robot = field(default_factory=Robot.point)
+    simplify: tuple[str, ...] = ()
     within: int = DEFAULT_WITHIN
 
     def __post_init__(self) -> None:
@@ -78,8 +79,7 @@ class Settings:
         for what, names in (("planners", self.planners), ("samplers", self.samplers)):
             if not names or len(set(names)) < len(names):
                 raise ConfigError(f"{what} must be named, and each once, got {show(list(names))}")
-        for name in self.samplers:
-            _check_sampler_name(name)
+        self.variants()
         whole_number("runs", self.runs, 1)
         variants = len(self.planners) * len(self.samplers)
         if self.runs * variants > MAX_RUNS:
@@ -96,18 +96,29 @@ class Settings:
             raise ConfigError(f"the seed of a benchmark must be an int, got {show(seed)}")
         whole_number("seed", seed, 0)
         whole_number("within", self.within, 1, MAX_WITHIN)
-        for planner in self.parameters:
-            if planner not in self.planners:
-                raise ConfigError(
-                    f"a parameter of {show(planner)} is set, which is not among the planners "
-                    f"{', '.join(self.planners)}"
-                )
+        for what, named in (("set", self.parameters), ("simplify", self.simplify)):
+            for planner in named:
+                if planner not in self.planners:
+                    raise ConfigError(
+                        f"{what} names {show(planner)}, which is not among the planners "
+                        f"{', '.join(self.planners)}"
+                    )
 
     def _spell_planners(self) -> None:
-        planners = tuple(planner_name(name) for name in self.planners)
+        for option in ("planners", "simplify"):
+            names = tuple(planner_name(name) for name in getattr(self, option))
+            object.__setattr__(self, option, names)
         parameters = {planner_name(name): values for name, values in self.parameters.items()}
-        object.__setattr__(self, "planners", planners)
         object.__setattr__(self, "parameters", parameters)
+
+    def variants(self) -> list[SamplerVariant]:
+        """Return the samplers, parsed."""
+        return [parse_sampler(name) for name in self.samplers]
+
+    @property
+    def sources(self) -> set[str]:
+        """The sources of the samplers' heat maps: their names without options."""
+        return {variant.source for variant in self.variants()}
 
     @property
     def seed(self) -> int:
@@ -133,14 +144,6 @@ class Settings:
             else:
                 saved[name] = getattr(self, name)
         return json.loads(json.dumps(saved))  # type: ignore[no-any-return]
-
-
-def _check_sampler_name(name: str) -> None:
-    if not (_SAMPLER_NAME.fullmatch(name) and name.isprintable()):
-        raise ConfigError(
-            "the name of a sampler has up to 40 printable characters and begins with a letter or "
-            f"digit, got {show(name)}"
-        )
 
 
 def parse_parameters(assignments: list[str]) -> dict[str, dict[str, Any]]:

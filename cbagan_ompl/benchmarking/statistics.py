@@ -16,11 +16,14 @@ from .measures import (
     COST,
     FAMILY,
     FIRST_COST,
+    FIRST_NODES,
     FIRST_TIME,
     INFERENCE,
     NODES,
+    NODES_ADDED,
     SOLVED,
     WITHIN_PERCENT,
+    nodes_within,
     time_within,
 )
 from .settings import BASELINE
@@ -126,6 +129,14 @@ def _effort(name: str) -> _Reader:
     return read
 
 
+def _nodes(name: str) -> _Reader:
+    def read(run: Mapping[str, str], _: ExperimentLog) -> _Value:
+        nodes = number(run[name])
+        return (float(run[NODES_ADDED]), True) if nodes is None else (nodes, False)
+
+    return read
+
+
 # The baseline has none.
 _NO_RATIO = frozenset({"inference_s"})
 
@@ -144,11 +155,23 @@ def within_key(percent: int, total: bool = False) -> str:
     return f"within_{percent}_percent{'_total' if total else ''}_s"
 
 
+def nodes_key(percent: int) -> str:
+    """Return the name of the number of nodes until a cost is within a threshold.
+
+    Example:
+        >>> nodes_key(5)
+        'nodes_to_5_percent'
+    """
+    return f"nodes_to_{percent}_percent"
+
+
 def measures_of(percents: Iterable[int] = WITHIN_PERCENT) -> dict[str, _Reader]:
     """Return what is measured, by name.
 
     Times are in seconds, of planning alone (``_s``) and with inference (``_total_s``); costs are
-    multiples of the best known one of the task.
+    multiples of the best known one of the task. Nodes are those that the planner has added until
+    its first path or a good one; ``nodes`` alone are those at its end, which for planners that run
+    to the time limit say how many it gets done.
 
     Args:
         percents: thresholds of good paths, percent above the best known cost.
@@ -160,6 +183,8 @@ def measures_of(percents: Iterable[int] = WITHIN_PERCENT) -> dict[str, _Reader]:
         "first_solution_total_s": _total_time(FIRST_TIME),
         **{within_key(percent): _planning_time(name) for percent, name in names.items()},
         **{within_key(percent, total=True): _total_time(name) for percent, name in names.items()},
+        "nodes_to_first": _nodes(FIRST_NODES),
+        **{nodes_key(percent): _nodes(nodes_within(percent)) for percent in names},
         "first_cost": _relative_cost(FIRST_COST),
         "final_cost": _relative_cost(COST),
         "nodes": _effort(NODES),

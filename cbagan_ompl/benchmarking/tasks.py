@@ -14,7 +14,7 @@ from zlib import crc32
 import numpy as np
 
 from ..common.text import one_line
-from ..common.validation import whole_number
+from ..common.validation import positive_number, whole_number
 from ..errors import ConfigError, HeatmapError, TaskError
 from ..maps.grid_map import GridMap
 from ..maps.loading import BUNDLED, bundled_maps
@@ -63,6 +63,27 @@ class BenchmarkTask:
         """``MAP_NUMBER``: the name of logs and heat maps of the task."""
         return f"{self.map_name}_{self.number}"
 
+    def why_impossible(self) -> str:
+        """Return why the task cannot be planned for, nothing where it can."""
+        try:
+            self.workspace.check_task(self.task.start, self.task.goal)
+        except TaskError as error:
+            return str(error)
+        return ""
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The tasks of a benchmark, and those that nobody could solve.
+
+    Attributes:
+        tasks: the tasks that can be planned for.
+        left_out: why a task cannot be planned for, by its name.
+    """
+
+    tasks: list[BenchmarkTask]
+    left_out: dict[str, str]
+
 
 def select_tasks(
     maps: Sequence[str],
@@ -71,28 +92,37 @@ def select_tasks(
     robot: Robot | None = None,
     seed: int = 0,
     map_options: Mapping[str, Any] | None = None,
-) -> list[BenchmarkTask]:
-    """Return the tasks on some maps: those of a file, else those of the map, else random ones.
+    least_distance: float | None = None,
+) -> Selection:
+    """Choose the tasks on some maps: those of a file, else those of the map, else random ones.
+
+    Tasks that cannot be planned for, such as those with an end in an obstacle, are left out.
 
     Args:
-        maps: map files, or ``bundled:NAME``; all bundled maps for none.
+        maps: map files, ``bundled:NAME``, or ``NAME=FILE``; all bundled maps for none. Files that
+            share their name are called after their folders.
         tasks: a ``.csv`` or ``.scen`` file, see :func:`cbagan_ompl.load_tasks`.
         tasks_per_map: at most so many of each map, spread evenly over its list; the number of
             random ones for a map without tasks.
         robot: what moves, a point by default.
         seed: seed of random tasks.
         map_options: keyword arguments of :meth:`GridMap.load`.
+        least_distance: from start to goal of random tasks, world units; half the longer side of
+            the map by default.
 
     Raises:
         MapError: a map or task file that cannot be used.
-        TaskError: a task that cannot be planned for.
+        TaskError: no task can be planned for; the message says why for one of them.
         ConfigError: two maps of one name, or an option that makes no sense.
     """
     if tasks_per_map is not None:
         whole_number("tasks per map", tasks_per_map, 1, MAX_TASKS)
-    selected = []
-    for path in maps or [BUNDLED + name for name in bundled_maps()]:
-        loaded = GridMap.load(path, **(map_options or {}))
+    if least_distance is not None:
+        positive_number("least distance", least_distance)
+    selected: list[BenchmarkTask] = []
+    left_out: dict[str, str] = {}
+    for name, path in name_maps(maps or [BUNDLED + name for name in bundled_maps()]):
+        loaded = GridMap.load(path, name=name, **(map_options or {}))
         # By the name of the file: that of an inflated map says so.
         workspace = Workspace(loaded, robot or Robot.point())
         if tasks is None:
@@ -100,14 +130,46 @@ def select_tasks(
         else:
             given = load_tasks(tasks, loaded)
         if not given:
-            given = random_tasks(workspace, tasks_per_map or _RANDOM_TASKS, seed)
-        for number in _spread(len(given), tasks_per_map):
-            task = given[number]
-            try:
-                workspace.check_task(task.start, task.goal)
-            except TaskError as error:
-                raise TaskError(f"task {number} of {loaded.name}: {error}") from error
-            selected.append(BenchmarkTask(workspace, number, task))
+            given = random_tasks(workspace, tasks_per_map or _RANDOM_TASKS, seed, least_distance)
+        numbered = [BenchmarkTask(workspace, number, task) for number, task in enumerate(given)]
+        reasons = {task.name: reason for task in numbered if (reason := task.why_impossible())}
+        possible = [task for task in numbered if task.name not in reasons]
+        selected += [possible[i] for i in _spread(len(possible), tasks_per_map)]
+        left_out |= reasons
+    if not selected:
+        name, reason = next(iter(left_out.items()))
+        raise TaskError(f"none of {len(left_out)} tasks can be planned for; {name}: {reason}")
+    _check_selected(selected)
+    return Selection(selected, left_out)
+
+
+def name_maps(words: Sequence[str]) -> list[tuple[str | None, str]]:
+    """Return the name and the file of each map; None for one that is called after its file.
+
+    Args:
+        words: files, ``bundled:NAME``, or ``NAME=FILE``. Different files with one name are called
+            after their folders.
+
+    Example:
+        >>> name_maps(["bundled:maze", "a/map.yaml", "b/map.yaml", "hall=c/map.yaml"])
+        [(None, 'bundled:maze'), ('a', 'a/map.yaml'), ('b', 'b/map.yaml'), ('hall', 'c/map.yaml')]
+    """
+    named: list[tuple[str | None, str]] = []
+    for word in words:
+        name, equals, file = str(word).partition("=")
+        given = bool(name and equals and file) and not os.path.exists(word)
+        named.append((name, file) if given else (None, str(word)))
+    unnamed = {file for name, file in named if name is None and not file.startswith(BUNDLED)}
+    stems = Counter(Path(file).stem for file in unnamed)
+    return [
+        (Path(os.path.abspath(file)).parent.name or None, file)
+        if name is None and file in unnamed and stems[Path(file).stem] > 1
+        else (name, file)
+        for name, file in named
+    ]
+
+
+def _check_selected(selected: Sequence[BenchmarkTask]) -> None:
     if len(selected) > MAX_TASKS:
         raise ConfigError(
             f"a benchmark has at most {MAX_TASKS} tasks, these are {len(selected)}; choose some "
@@ -117,9 +179,8 @@ def select_tasks(
     if count > 1:
         raise ConfigError(
             f"maps must have different names, there are two {name} (characters other than letters, "
-            "digits, '_', '.' and '-' count as '_')"
+            "digits, '_', '.' and '-' count as '_'): name one, as NAME=FILE"
         )
-    return selected
 
 
 def _spread(count: int, most: int | None) -> list[int]:
@@ -130,8 +191,10 @@ def _spread(count: int, most: int | None) -> list[int]:
     return numbers
 
 
-def random_tasks(workspace: Workspace, count: int, seed: int) -> list[Task]:
-    """Return tasks between random connected free pixels, at least half the map apart.
+def random_tasks(
+    workspace: Workspace, count: int, seed: int, least_distance: float | None = None
+) -> list[Task]:
+    """Return tasks between random connected free pixels.
 
     The headings of robots that have one are uniform. The same map, robot and seed give the same
     tasks.
@@ -140,6 +203,8 @@ def random_tasks(workspace: Workspace, count: int, seed: int) -> list[Task]:
         workspace: the robot on the map.
         count: number of tasks.
         seed: at least 0.
+        least_distance: between start and goal, world units; half the longer side of the map by
+            default.
 
     Raises:
         TaskError: the map has none or too few such pairs of pixels.
@@ -150,7 +215,8 @@ def random_tasks(workspace: Workspace, count: int, seed: int) -> list[Task]:
     rows, columns = np.nonzero(grid.free)
     points = grid.to_world(np.stack((columns, rows), -1) + 0.5)
     labels = grid.components[rows, columns]
-    least = _LEAST_DISTANCE * max(grid.shape) * grid.resolution
+    half = _LEAST_DISTANCE * max(grid.shape) * grid.resolution
+    least = half if least_distance is None else least_distance
     tasks: list[Task] = []
     tries = 0
     while tries < _MAX_TRIES * _RANDOM_TASKS:  # since the last task that was found

@@ -15,13 +15,21 @@ from ..planning.heatmap_sources import (
     LEARNED,
     SAMPLERS,
     HeatmapSource,
+    ModelOrFile,
     heatmap_source,
     resolve_auto,
 )
 from ..planning.ompl_benchmark import PlannerVariant, RunOptions, check_variants, run_benchmark
 from ..sampling.heatmap import Heatmap
 from .logs import GEOMETRIC, ExperimentLog, concatenate_logs, format_log, parse_log
-from .measures import FAMILY, MAP, add_measures, check_measures, thresholds
+from .measures import (
+    AUTO_SOURCE,
+    FAMILY,
+    MAP,
+    add_measures,
+    check_measures,
+    thresholds,
+)
 from .settings import Settings
 from .tasks import BenchmarkTask, heatmap_file
 
@@ -149,13 +157,19 @@ def _options(job: Job) -> RunOptions:
 
 def _variants(job: Job) -> list[PlannerVariant]:
     settings = job.settings
-    sources = {sampler: _source(job, sampler) for sampler in settings.samplers}
+    samplers = settings.variants()
+    sources = {name: _source(job, name) for name in dict.fromkeys(one.source for one in samplers)}
     return [
         PlannerVariant(
-            planner, sampler, source, tuple(dict(settings.parameters.get(planner, {})).items())
+            planner,
+            sampler.name,
+            sources[sampler.source],
+            tuple(dict(settings.parameters.get(planner, {})).items()),
+            sampler.changes,
+            planner in settings.simplify,
         )
         for planner in settings.planners
-        for sampler, source in sources.items()
+        for sampler in samplers
     ]
 
 
@@ -171,13 +185,20 @@ def _source(job: Job, sampler: str) -> HeatmapSource | None:
     if model is not None and sampler in set(SAMPLERS) - {LEARNED}:
         raise ConfigError(f"a model cannot be called {sampler}, this is another sampler's name")
     if sampler == AUTO:
-        given = job.settings.models.get(LEARNED)
-        return heatmap_source(*resolve_auto(sampler, given, job.task.grid))[1]
+        return heatmap_source(*_resolve_auto(job))[1]
     return heatmap_source(sampler if model is None else LEARNED, model)[1]
 
 
+def _resolve_auto(job: Job) -> tuple[str, ModelOrFile | None]:
+    return resolve_auto(AUTO, job.settings.models.get(LEARNED), job.task.workspace.source)
+
+
 def _add_task(log: ExperimentLog, job: Job) -> ExperimentLog:
-    return replace(log, parameters={**log.parameters, **_task_parameters(job)})
+    """Return a log with what the task is, and what makes its heat maps here."""
+    made_by = {}
+    if AUTO in job.settings.sources:
+        made_by[AUTO_SOURCE] = _resolve_auto(job)[0]
+    return replace(log, parameters={**log.parameters, **_task_parameters(job), **made_by})
 
 
 def _task_parameters(job: Job) -> dict[str, str]:

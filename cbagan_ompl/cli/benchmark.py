@@ -35,6 +35,8 @@ _HELP = """\
 Compare samplers in OMPL's own planners, with OMPL's Benchmark, on the same tasks.
 
 MAP is what `plan` takes; without any, the bundled maps are used ({maps}).
+NAME=FILE gives a map another name than its file's. Files of one name, such as map.yaml, are called
+after their folders. Tasks that cannot be planned for are left out, counted and named.
 `@FILE` stands for the arguments in FILE, one a line: a benchmark can be kept in a file.
 
 At the end the output folder holds:
@@ -63,7 +65,9 @@ def add_benchmark_parser(commands: Any) -> None:
     parser.reads_files = True
     parser.describe_more = describe_planners
     parser.set_defaults(run=_benchmark)
-    parser.add_argument("maps", nargs="*", metavar="MAP", help="map file, or bundled:NAME")
+    parser.add_argument(
+        "maps", nargs="*", metavar="MAP", help="map file, bundled:NAME or NAME=FILE"
+    )
 
     tasks = parser.add_argument_group("tasks")
     tasks.add_argument(
@@ -78,6 +82,13 @@ def add_benchmark_parser(commands: Any) -> None:
         type=int,
         metavar="N",
         help="at most N tasks of each map, spread over its list (default: all; 4 random ones)",
+    )
+    tasks.add_argument(
+        "--least-distance",
+        type=float,
+        metavar="D",
+        help="least distance from start to goal of random tasks, world units (default: half the "
+        "longer side of the map)",
     )
     add_map_options(tasks)
     add_robot_options(parser.add_argument_group("robot", "what moves; a point by default"))
@@ -95,7 +106,9 @@ def add_benchmark_parser(commands: Any) -> None:
         type=_names,
         default=defaults.samplers,
         metavar="A,B",
-        help=f"{describe_samplers()} (default: {','.join(defaults.samplers)})",
+        help=f"{describe_samplers()}; NAME:OPTION=VALUE changes an option for one of them, as in "
+        "learned:adaptation=none, :sharpness=1 or :uniform_fraction=0.2 "
+        f"(default: {','.join(defaults.samplers)})",
     )
     comparison.add_argument(
         "--heatmap-dir",
@@ -130,6 +143,14 @@ def add_benchmark_parser(commands: Any) -> None:
         default=[],
         metavar="PLANNER.parameter=value",
         help="call a setter of a planner: RRTstar.rewire_factor=1.2 is setRewireFactor(1.2)",
+    )
+
+    comparison.add_argument(
+        "--simplify",
+        type=_names,
+        default=defaults.simplify,
+        metavar="A,B",
+        help="planners whose paths OMPL's path simplifier shortens after each run; its time counts",
     )
 
     effort = parser.add_argument_group("effort")
@@ -202,7 +223,8 @@ def _cores() -> int:
 
 def _settings(args: argparse.Namespace) -> Settings:
     folders, models = dict(args.heatmap_dir), dict(args.model)
-    additional = [name for name in models if name not in args.samplers]
+    named = {name.partition(":")[0] for name in args.samplers}
+    additional = [name for name in models if name not in named]
     if LEARNED in additional:
         raise ConfigError(
             f"--model {models[LEARNED]}: the learned sampler is not among the samplers"
@@ -218,13 +240,14 @@ def _settings(args: argparse.Namespace) -> Settings:
         models=models,
         heatmap_dirs=folders,
         robot=robot_of(args),
+        simplify=args.simplify,
         within=args.within,
     )
 
 
 def _benchmark(args: argparse.Namespace) -> int:
     from ..benchmarking.benchmark import Benchmark, write_results
-    from ..benchmarking.report import warn_of_hosts
+    from ..benchmarking.report import describe_left_out, warn_of_hosts
     from ..benchmarking.tasks import select_tasks
 
     whole_number("jobs", args.jobs, 1, _MOST_JOBS)
@@ -234,16 +257,25 @@ def _benchmark(args: argparse.Namespace) -> int:
             file=sys.stderr,
         )
     settings = _settings(args)
-    tasks = select_tasks(
-        args.maps, args.tasks, args.tasks_per_map, settings.robot, args.seed, map_options(args)
+    chosen = select_tasks(
+        args.maps,
+        args.tasks,
+        args.tasks_per_map,
+        settings.robot,
+        args.seed,
+        map_options(args),
+        args.least_distance,
     )
-    benchmark = Benchmark(tasks, settings, Path(args.output), args.resume)
+    if chosen.left_out:
+        print("warning:", *describe_left_out(chosen.left_out), sep="\n", file=sys.stderr)
+    benchmark = Benchmark(chosen.tasks, settings, Path(args.output), args.resume)
     with open_executor(args) as executor:
         failures = benchmark.run(executor)
     logs = benchmark.finished_logs(failures)
     if logs:
         command = one_line(shlex.join(["cbagan-ompl", *sys.argv[1:]]), _LONGEST_COMMAND)
-        print(write_results(logs, settings, failures, benchmark.folder, command))
+        folder, left_out = benchmark.folder, chosen.left_out
+        print(write_results(logs, settings, failures, folder, command, left_out))
         said = warn_of_hosts(Counter(log.host for log in logs))
         if said:
             print(f"warning: {said}", file=sys.stderr)

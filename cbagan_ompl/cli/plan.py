@@ -8,10 +8,8 @@ from typing import Any
 from ..common.outputs import check_output, write_report
 from ..errors import ConfigError
 from ..maps.grid_map import GridMap
-from ..maps.grid_search import COMPILED
 from ..maps.loading import bundled_maps
 from ..maps.tasks import tasks_of
-from ..planning.heatmap_sources import CORRIDOR
 from ..robots.robot import Robot
 from ..sampling.heatmap import Heatmap
 from .inputs import input_files
@@ -205,7 +203,6 @@ def _print_summary(values: dict[str, Any], figure: str | None) -> None:
         **{f"{role} moved": _describe_move(values, role) for role in values["snapped"]},
         "planner": f"{values['planner']}, OMPL {values['ompl_version']}",
         "sampler": f"{values['sampler']}, hook {values['hook'] or 'none'}",
-        **({"grid search": _describe_search(values)} if values["sampler"] == CORRIDOR else {}),
         "samples": _describe_samples(values),
         "nodes": values["nodes"],
         "inference": f"{values['inference_s']:.4f} s",
@@ -224,12 +221,6 @@ _SAMPLES = {
     "corridor": "from the corridor",
     "straight-line": "from the straight line",
 }
-
-
-def _describe_search(values: dict[str, Any]) -> str:
-    if values["grid_search"] == COMPILED:
-        return COMPILED
-    return f"{values['grid_search']}; a compiled one: pip install 'cbagan-ompl[search]'"
 
 
 def _describe_samples(values: dict[str, Any]) -> str:

@@ -12,6 +12,7 @@ from ..common.validation import require_torch, whole_number
 from ..datasets.dataset import load_dataset
 from ..datasets.synthetic import HARD_DETOUR, TASKS_PER_MAP, SyntheticSettings
 from ..errors import ConfigError
+from ..inference.model_files import is_model
 from ..networks.config import NETWORKS
 from ..training.checkpoint_files import read_checkpoint
 from ..training.config import LAST, PRESETS, TrainingConfig
@@ -164,7 +165,11 @@ def add_export_parser(subparsers: Any) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.set_defaults(run=_export)
-    parser.add_argument("checkpoint", metavar="CHECKPOINT", help="best.pt of a training run")
+    parser.add_argument(
+        "checkpoint",
+        metavar="CHECKPOINT",
+        help="best.pt of a training run; or an exported model, to write it anew",
+    )
     parser.add_argument("--output", required=True, metavar="FILE", help="the model file, .pt")
     parser.add_argument(
         "--note", default="", metavar="TEXT", help="for the card: origin and licence of the data"
@@ -255,7 +260,8 @@ def _print_scores(result: dict[str, Any]) -> None:
 
 
 def _export(args: argparse.Namespace) -> int:
-    read_checkpoint(Path(args.checkpoint))
+    if not is_model(Path(args.checkpoint)):
+        read_checkpoint(Path(args.checkpoint))
     require_torch()
     from ..training.export import export
 

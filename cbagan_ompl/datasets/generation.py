@@ -22,7 +22,6 @@ from ..common.validation import (
     check_fraction,
     finite_number,
     positive_number,
-    require,
     whole_number,
 )
 from ..errors import ConfigError, DatasetError, show
@@ -131,11 +130,6 @@ class GenerationSettings:
         self.select_test_tasks()
 
     @property
-    def needs_distances(self) -> bool:
-        """Whether tasks or labels are made from geodesic distances."""
-        return self.label == "geodesic" or self.hard_fraction > 0
-
-    @property
     def longest_edge(self) -> float:
         """Longest edge of RRT in pixels."""
         return self.size * RANGE if self.range is None else self.range
@@ -168,13 +162,10 @@ def generate(
     Raises:
         ConfigError: ``resume`` with other settings, or without it although the folder holds a
             set; or files that are no part of such a set are in its place.
-        MissingDependencyError: geodesic distances are needed, and numba is not installed.
         DatasetError: a file cannot be written, a map has no task of the wanted distance, or a
             process has died.
         ClusterError: the cluster cannot do the work.
     """
-    if settings.needs_distances:
-        require("numba", "train")
     prepare_folder(folder, settings, resume, {})
     executor = executor or LocalExecutor(jobs)
     write_missing(folder, settings, executor, progress, [None] * settings.maps)

@@ -1,4 +1,4 @@
-"""Geodesic distances on a grid: lengths of shortest paths at any angle. Needs numba.
+"""Geodesic distances on a grid: lengths of shortest paths at any angle.
 
 The distance D from a source solves the eikonal equation |grad D| = 1 on the free pixels. It is
 solved by fast sweeping, a first-order scheme: H. Zhao, "A fast sweeping method for eikonal
@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ..common.compilation import compiled
 
 # Sweeps end when no distance changes by more than this, in pixels.
 _TOLERANCE = 1e-3
@@ -47,7 +48,7 @@ def distance_field(free: NDArray[np.bool_], source: tuple[int, int]) -> NDArray[
     return padded[1:-1, 1:-1]
 
 
-@njit(cache=True)
+@compiled
 def _sweep(
     free: NDArray[np.bool_], values: NDArray[np.float32], fixed: NDArray[np.bool_]
 ) -> None:  # pragma: no cover

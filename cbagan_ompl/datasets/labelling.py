@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.parallel import Executor, LocalExecutor
-from ..common.validation import require
 from ..inference.scaling import scaled_free, scaled_shape
 from ..maps.grid_map import GridMap
 from .generation import GenerationSettings, prepare_folder, write_missing
@@ -43,13 +42,10 @@ def label_maps(
 
     Raises:
         ConfigError: see :func:`generate`; or the maps are others than before.
-        MissingDependencyError: geodesic distances are needed, and numba is not installed.
         DatasetError: a file cannot be written, a map has no task of the wanted distance, or a
             process has died.
         ClusterError: the cluster cannot do the work.
     """
-    if settings.needs_distances:
-        require("numba", "train")
     squares = [square_map(grid.free, settings.size) for grid in maps.values()]
     hashes = [hashlib.sha256(np.packbits(free).tobytes()).hexdigest() for free in squares]
     record = {"maps": dict(zip(maps, hashes, strict=True))}

@@ -72,14 +72,14 @@ class SyntheticSettings:
 
 
 def generate_map_tasks(settings: SyntheticSettings, part: int, number: int) -> Tasks:
-    """Generate one map and its :data:`TASKS_PER_MAP` tasks. Needs numba.
+    """Generate one map and its :data:`TASKS_PER_MAP` tasks.
 
     Args:
         settings: of the tasks.
         part: number of the part, such as training or validation: maps of different parts differ.
         number: of the map in its part.
     """
-    # Here, since numba is optional and compiles on first use.
+    # Here, since numba takes long to import.
     from .geodesic import distance_field
 
     rng = np.random.default_rng((settings.seed, part, number))

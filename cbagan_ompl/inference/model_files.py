@@ -38,6 +38,10 @@ MAX_MODEL_BYTES = 4 * MAX_WEIGHTS + MAX_EXPANSION
 #: Largest TorchScript file of another origin, such as an Inception network.
 MAX_SCRIPT_BYTES = 2**28
 
+#: Methods of a module that is exported in parts, see
+#: :class:`cbagan_ompl.networks.export_model.SplitModel`; ``forward`` is all of them together.
+SPLIT_METHODS = ("read_map", "encode", "paint")
+
 #: Most characters of a model's name.
 MAX_NAME_LENGTH = 100
 
@@ -204,7 +208,7 @@ def load_script(script: bytes) -> torch.nn.Module:
     import torch
 
     with warnings.catch_warnings():
-        # TorchScript is deprecated, see save_script in training/export.
+        # TorchScript is deprecated, see training/torchscript.
         warnings.simplefilter("ignore", DeprecationWarning)
         module: torch.nn.Module = torch.jit.load(io.BytesIO(script), map_location="cpu")  # type: ignore[no-untyped-call]
     return module

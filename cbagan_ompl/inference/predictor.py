@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import AbstractContextManager
 from os import PathLike
 from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,10 +22,11 @@ from ..robots.poses import position_map, position_of
 from ..robots.robot import Robot
 from ..sampling.heatmap import Heatmap
 from .bundled_models import find_model
+from .convolutions import use_onednn
 from .model_files import load_script, read_model
 from .probe import Kind, try_model
 from .scaling import enlarged_values, scaled_map, scaled_shape
-from .torch_state import own_torch_state
+from .torch_runtime import KeptMaps, TorchRuntime
 
 if TYPE_CHECKING:
     import torch
@@ -68,7 +71,9 @@ def load_model(path: str | PathLike[str] | None = None) -> Predictor:
     if not model.is_listed:
         try_model(str(source), model.script, Kind.REGION, model.record["working_size"])
     try:
-        predictor = Predictor(load_script(model.script), model.record)
+        module = load_script(model.script)
+        use_onednn(module)
+        predictor = Predictor(module, model.record)
         predictor.warm_up()
         prepare_search(with_costs=True)  # for regions that have to be connected
     except ModelError as error:
@@ -120,6 +125,8 @@ class Predictor:
         self.module = module
         self.record = record
         self.inference_threads = 1
+        self._runtime = TorchRuntime(module)
+        self._kept: WeakKeyDictionary[GridMap, KeptMaps] = WeakKeyDictionary()
 
     def warm_up(self) -> None:
         """Predict for an empty map, since the first call takes up to four times as long.
@@ -219,8 +226,7 @@ class Predictor:
         shape = scaled_shape(grid.shape, int(self.record["working_size"]))
         scale = shape[1] / grid.width, shape[0] / grid.height
         endpoints = grid.to_pixel(np.array(tasks)) * scale
-        free = np.broadcast_to(scaled_map(grid, shape), (len(tasks), *shape))
-        outputs = self.probabilities(free, endpoints[:, 0], endpoints[:, 1])
+        outputs = self._run(self._read_grid(grid, shape), endpoints[:, 0], endpoints[:, 1])
         heatmaps = [_make_heatmap(values, grid) for values in outputs]
         if not repair:
             return heatmaps
@@ -242,27 +248,40 @@ class Predictor:
         Raises:
             ModelError: there is not enough memory.
         """
-        import torch
+        return self._run(self._read_maps(free), start, goal)
 
-        cells = torch.from_numpy(free.astype(np.float32))[:, None]
-        endpoints = (torch.from_numpy(points.astype(np.float32)) for points in (start, goal))
-        with (
-            translate_lack_of_memory(
-                ModelError,
-                f"to predict for cells of shape {tuple(cells.shape)}",
-                "give it fewer at a time, or take a model with a smaller working size",
-            ),
-            own_torch_state(self.inference_threads),
-        ):
-            values = self.module(cells, *endpoints)
-            result: NDArray[np.float32] = values[:, 0].numpy()
-        return result
+    def _read_grid(self, grid: GridMap, shape: tuple[int, int]) -> KeptMaps:
+        """Return a map at a size as the network has read it; a second task does not pay for it."""
+        kept = self._kept.get(grid)
+        if kept is None or kept.shape != shape:
+            kept = self._kept[grid] = self._read_maps(scaled_map(grid, shape)[None])
+        return kept
+
+    def _read_maps(self, free: NDArray[np.bool_]) -> KeptMaps:
+        with _translate_lack_of_memory(free.shape):
+            return self._runtime.read_maps(free)
+
+    def _run(
+        self, maps: KeptMaps, start: NDArray[np.floating], goal: NDArray[np.floating]
+    ) -> NDArray[np.float32]:
+        """Return the probabilities for tasks on maps, (B, H, W)."""
+        self._runtime.threads = self.inference_threads
+        with _translate_lack_of_memory((len(start), *maps.shape)):
+            return self._runtime.probabilities(maps, start, goal)[:, 0]
 
     def __repr__(self) -> str:
         return (
             f"Predictor({self.record.get('name')!r}, "
             f"working size {self.record['working_size']} pixels)"
         )
+
+
+def _translate_lack_of_memory(shape: tuple[int, ...]) -> AbstractContextManager[None]:
+    return translate_lack_of_memory(
+        ModelError,
+        f"to predict for maps of shape {shape}",
+        "give it fewer at a time, or take a model with a smaller working size",
+    )
 
 
 def _list_points(name: str, points: Iterable[ArrayLike]) -> list[ArrayLike]:

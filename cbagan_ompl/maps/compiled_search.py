@@ -1,4 +1,4 @@
-"""Shortest paths on a grid by compiled searches, for :mod:`.grid_search`. Needs numba.
+"""Shortest paths on a grid by compiled searches, for :mod:`.grid_search`.
 
 Where every pixel costs the same, by jump point search, with the rules for diagonal steps that cut
 no corner: D. Harabor and A. Grastien, "Online graph pruning for pathfinding on grid maps", AAAI
@@ -10,16 +10,18 @@ octile distance.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import floor
+from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ..common.compilation import compiled
 from .collision import segment_is_free
 
 #: :func:`.collision.segment_is_free`, compiled: takes an array in place of bytes.
-segment_is_free_compiled = njit(cache=True)(segment_is_free)
+segment_is_free_compiled: Callable[..., bool] = compiled(segment_is_free)
 
 # The eight steps: rows down, columns to the right; diagonal ones last.
 _DOWN = np.array((0, 1, 0, -1, 1, 1, -1, -1))
@@ -76,7 +78,7 @@ def find_path(
     return np.stack((pixels % width - 1, pixels // width - 1), axis=-1)
 
 
-@njit(cache=True)
+@compiled
 def _search_steps(
     cells: NDArray[np.bool_],
     costs: NDArray[np.float32],
@@ -124,7 +126,7 @@ def _search_steps(
     return False
 
 
-@njit(cache=True)
+@compiled
 def _search_jumps(
     cells: NDArray[np.bool_],
     width: int,
@@ -163,7 +165,7 @@ def _search_jumps(
     return False
 
 
-@njit(cache=True)
+@compiled
 def _jump(
     cells: NDArray[np.bool_], width: int, here: int, down: int, right: int, goal: int
 ) -> int:  # pragma: no cover
@@ -192,7 +194,7 @@ def _jump(
     return -1
 
 
-@njit(cache=True)
+@compiled
 def _jump_straight(
     cells: NDArray[np.bool_], here: int, step: int, side: int, goal: int
 ) -> int:  # pragma: no cover
@@ -208,7 +210,7 @@ def _jump_straight(
     return -1
 
 
-@njit(cache=True)
+@compiled
 def _key(
     paid: float, here: int, goal: int, width: int, cheapest: float
 ) -> float:  # pragma: no cover
@@ -218,7 +220,7 @@ def _key(
     return floor((paid / cheapest + left) * _STEPS + 0.5) + left / 2.0**20
 
 
-@njit(cache=True)
+@compiled
 def _add(
     keys: NDArray[np.float64], nodes: NDArray[np.int64], size: int, key: float, node: int
 ) -> int:  # pragma: no cover
@@ -234,7 +236,7 @@ def _add(
     return size + 1
 
 
-@njit(cache=True)
+@compiled
 def _remove_first(
     keys: NDArray[np.float64], nodes: NDArray[np.int64], size: int
 ) -> int:  # pragma: no cover
@@ -253,15 +255,15 @@ def _remove_first(
     return size
 
 
-@njit(cache=True)
-def _double(values):  # type: ignore[no-untyped-def]  # pragma: no cover
+@compiled
+def _double(values: NDArray[Any]) -> NDArray[Any]:  # pragma: no cover
     """Return a copy with room for as much again."""
     larger = np.empty(2 * len(values), values.dtype)
     larger[: len(values)] = values
     return larger
 
 
-@njit(cache=True)
+@compiled
 def _trace(
     before: NDArray[np.int32], width: int, start: int, goal: int
 ) -> NDArray[np.int64]:  # pragma: no cover

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from os import PathLike
 from typing import Any
@@ -77,12 +78,13 @@ class GridMap:
         self._inflated: dict[float, GridMap] = {}
 
     @classmethod
-    def load(cls, path: str | PathLike[str], **options: Any) -> GridMap:
+    def load(cls, path: str | PathLike[str], *, name: str | None = None, **options: Any) -> GridMap:
         """Read a map file: PNG, JPG, BMP or PGM image, ROS map_server YAML, or MovingAI ``.map``.
 
         Args:
             path: the file; its kind is recognised by its suffix. ``bundled:NAME`` reads one of the
                 maps that come with the package (see :func:`cbagan_ompl.bundled_maps`).
+            name: what the map is called in messages and results; after its file by default.
             **options: the fields of :class:`cbagan_ompl.maps.loading.MapOptions`, such as
                 ``threshold`` and ``unknown_is_free``.
 
@@ -94,7 +96,8 @@ class GridMap:
             >>> GridMap.load("bundled:maze")
             GridMap('maze', 256 x 256 pixels of 1, image frame, 82% free)
         """
-        return cls._of(read_map(path, **options))
+        raw = read_map(path, **options)
+        return cls._of(raw if name is None else replace(raw, name=name))
 
     @classmethod
     def from_occupancy_grid(

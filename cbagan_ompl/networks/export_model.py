@@ -8,12 +8,7 @@ from torch.nn import functional
 
 from .encoding import SPOT_RADIUS, map_image, point_image, region_probability
 from .generator import Generator
-from .passage_generator import PassageGenerator
-from .passages import endpoint_nodes
 from .patch_generator import PatchGenerator, endpoint_cells
-
-#: The generators.
-AnyGenerator = Generator | PatchGenerator | PassageGenerator
 
 
 class RegionModel(nn.Module):
@@ -42,117 +37,67 @@ class RegionModel(nn.Module):
             goal: (B, 2), the same.
         """
         height, width = free.size(2), free.size(3)
-        # Blocked pixels pad to the stride and are cut off again.
-        probability: Tensor = self.model(pad_to_stride(free, self.stride), start, goal)
+        probability: Tensor = self.model(self.padded(free), start, goal)
         return probability[:, :, :height, :width]
 
+    def padded(self, free: Tensor) -> Tensor:
+        """Return a map with blocked pixels to the right and below, up to the stride."""
+        right, below = -free.size(3) % self.stride, -free.size(2) % self.stride
+        return functional.pad(free, [0, right, 0, below]) if right > 0 or below > 0 else free
 
-class PassageModel(nn.Module):
-    """A :class:`PassageGenerator` without its images, in parts that can be called by themselves.
 
-    What :meth:`encode` returns depends on the map alone, and :meth:`distances` has no weights: a
-    caller may keep the one and compute the other by compiled code
-    (:mod:`cbagan_ompl.networks.fast_marching`).
+class SplitModel(RegionModel):
+    """A region model with a wavefront, whose parts can be called one by one.
 
-    Args:
-        generator: with its trained weights, in evaluation mode.
+    So a program can keep what depends on the map alone for its next task, and compute the distance
+    fields in a quicker way than TorchScript: the exported file has these methods as well as
+    :meth:`forward`, which computes the same.
     """
 
-    def __init__(self, generator: PassageGenerator) -> None:
-        super().__init__()
-        self.generator = generator
-        self.stride = generator.stride
-        self.map_stem = _make_free_stem(generator.map_stem)
-        no_noise = generator.noise_stem(torch.zeros(1, 1, generator.cell, generator.cell))
-        self.no_noise = nn.Parameter(no_noise.detach(), requires_grad=False)
-
-    def forward(self, free: Tensor, start: Tensor, goal: Tensor) -> Tensor:
-        """Return the probability of the region, as :meth:`RegionModel.forward`."""
-        features, costs, codes = self.encode(free)
-        distances, towards = self.distances(costs, codes, start, goal)
-        return self.paint(features, costs, codes, distances, towards, free)[0]
-
     @torch.jit.export
-    def encode(self, free: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Return features, costs and codes of the patches of a map.
+    def read_map(self, free: Tensor) -> list[Tensor]:
+        """Return what depends on the map alone, for :meth:`encode` and :meth:`paint`.
 
         Args:
-            free: (B, 1, H, W) in [0, 1], 1 where free, of any size.
-
-        Returns:
-            (B, stem, h, w), (B, 3, h, w) and (B, 3, h, w) int32, see :class:`PassageGenerator`; of
-            h x w patches, in which the map is padded to the stride.
+            free: (1, 1, H, W) in [0, 1], 1 where free.
         """
-        free = pad_to_stride(free, self.stride)
-        map_features = torch.relu(self.map_stem(tiles_of(free, 4))).permute(0, 3, 1, 2)
-        features, costs = self.generator.encode(map_features, self.no_noise)
-        return features, costs, self.generator.codes(free)
+        kept: list[Tensor] = self.model.read_map(self.padded(free))  # type: ignore[operator]
+        return kept
 
     @torch.jit.export
-    def distances(
-        self, costs: Tensor, codes: Tensor, start: Tensor, goal: Tensor
-    ) -> tuple[Tensor, Tensor]:
-        """Return the distances from start and goal, and the directions in which they fall.
-
-        See :mod:`.passages`: (B, 2, 3, h, w) and (B, 2, 2, 3, h, w).
+    def encode(self, kept: list[Tensor], start: Tensor, goal: Tensor) -> list[Tensor]:
+        """Return what the distance fields are computed from.
 
         Args:
-            costs: from :meth:`encode`.
-            codes: the same.
-            start: (B, 2), pixel coordinates (u, v).
+            kept: from :meth:`read_map`.
+            start: (B, 2), as for :meth:`forward`.
             goal: (B, 2), the same.
-        """
-        nodes = endpoint_nodes(start, codes), endpoint_nodes(goal, codes)
-        return self.generator.distances(costs, codes, nodes[0], nodes[1])
-
-    @torch.jit.export
-    def paint(
-        self,
-        features: Tensor,
-        costs: Tensor,
-        codes: Tensor,
-        distances: Tensor,
-        towards: Tensor,
-        free: Tensor,
-    ) -> tuple[Tensor, Tensor]:
-        """Return the probability of the region, and the directions of travel.
-
-        Args:
-            features: from :meth:`encode`.
-            costs: the same.
-            codes: the same.
-            distances: from :meth:`distances`.
-            towards: the same.
-            free: (B, 1, H, W), as for :meth:`encode`.
 
         Returns:
-            (B, 1, H, W) in [0, 1], and (B, 2, h, w): unit vectors (u, v), v down, of each patch; 0
-            where no path leads.
+            The costs of the steps between cells, (4, h, w, K), as :func:`.wavefront.step_costs`
+            takes them; the cells of the endpoints, (B, 2, h, w), positive there; and features for
+            :meth:`paint`.
         """
-        height, width = free.size(2), free.size(3)
-        region, direction = self.generator.paint(
-            features, costs, codes, distances, towards, pad_to_stride(free, self.stride)
-        )
-        return region[:, :, :height, :width], direction
+        encoded: list[Tensor] = self.model.encode(kept, start, goal)  # type: ignore[operator]
+        return encoded
+
+    @torch.jit.export
+    def paint(self, kept: list[Tensor], features: Tensor, distances: Tensor) -> Tensor:
+        """Return the probability of the region, of the map as it is padded to the stride.
+
+        Args:
+            kept: from :meth:`read_map`.
+            features: from :meth:`encode`.
+            distances: (2, h, w, K), from the start and from the goal.
+        """
+        probability: Tensor = self.model.paint(kept, features, distances)  # type: ignore[operator]
+        return probability
 
 
-def export_module(generator: AnyGenerator) -> RegionModel | PassageModel:
-    """Return the module that an exported file holds.
-
-    Args:
-        generator: with its trained weights, in evaluation mode.
-    """
-    if isinstance(generator, PassageGenerator):
-        return PassageModel(generator)
-    return RegionModel(generator)
-
-
-def pad_to_stride(free: Tensor, stride: int) -> Tensor:
-    """Return maps with blocked pixels to the right and below, up to multiples of a stride."""
-    right, below = -free.size(3) % stride, -free.size(2) % stride
-    if right > 0 or below > 0:
-        return functional.pad(free, [0, right, 0, below])
-    return free
+def make_region_model(generator: Generator | PatchGenerator) -> RegionModel:
+    """Return what is exported of a generator with its trained weights, in evaluation mode."""
+    is_split = isinstance(generator, PatchGenerator) and generator.wavefront is not None
+    return (SplitModel if is_split else RegionModel)(generator).eval()
 
 
 class ImageModel(nn.Module):
@@ -198,15 +143,43 @@ class PatchModel(nn.Module):
 
     def forward(self, free: Tensor, start: Tensor, goal: Tensor) -> Tensor:
         """Return the probability of the region, as :meth:`RegionModel.forward`."""
-        map_features = torch.relu(self.map_stem(tiles_of(free, self.patch))).permute(0, 3, 1, 2)
-        point_features, endpoints = self.points(
-            start, goal, map_features.size(2) // 2, map_features.size(3) // 2
-        )
+        map_features = self.map_features(free)
+        point_features, endpoints = self.points(start, goal, map_features)
         features = self.generator.features(map_features, point_features, free, endpoints)
         probability: Tensor = self.generator.region(features, free)
         return probability
 
-    def points(self, start: Tensor, goal: Tensor, height: int, width: int) -> tuple[Tensor, Tensor]:
+    def map_features(self, free: Tensor) -> Tensor:
+        """Return the features of the patches of a map, (B, stem, h, w)."""
+        return torch.relu(self.map_stem(tiles_of(free, self.patch))).permute(0, 3, 1, 2)
+
+    def read_map(self, free: Tensor) -> list[Tensor]:
+        """Return what depends on the map alone, see :meth:`SplitModel.read_map`."""
+        map_features = self.map_features(free)
+        return [
+            map_features,
+            self.generator.merge(map_features),
+            self.generator.blocked(free),
+            free,
+        ]
+
+    def encode(self, kept: list[Tensor], start: Tensor, goal: Tensor) -> list[Tensor]:
+        """Return what is computed before the distance fields, see :meth:`SplitModel.encode`."""
+        assert self.generator.wavefront is not None
+        point_features, endpoints = self.points(start, goal, kept[0])
+        features = self.generator.cell_features(kept[1] + point_features)
+        edges = self.generator.wavefront.edge_costs(features, kept[2])
+        return [edges, endpoints, features]
+
+    def paint(self, kept: list[Tensor], features: Tensor, distances: Tensor) -> Tensor:
+        """Return what is computed after the distance fields, see :meth:`SplitModel.paint`."""
+        assert self.generator.wavefront is not None
+        closeness = self.generator.wavefront.closeness(distances, features.size(0))
+        patches = self.generator.patch_features(features, closeness, kept[0])
+        probability: Tensor = self.generator.region(patches, kept[3])
+        return probability
+
+    def points(self, start: Tensor, goal: Tensor, map_features: Tensor) -> tuple[Tensor, Tensor]:
         """Return the features of two points without noise, and the cells of the points.
 
         Only windows around both endpoints are made as images, each with the whole spot of one
@@ -215,34 +188,38 @@ class PatchModel(nn.Module):
         Args:
             start: (B, 2), pixel coordinates (u, v).
             goal: (B, 2), the same.
-            height: of the map, in cells.
-            width: of the map, in cells.
+            map_features: of the patches, (B, stem, 2 h, 2 w), for the size of the map.
 
         Returns:
-            (B, width of the generator, height, width), and (B, 2, height, width) as
+            (B, width of the generator, h, w), and (B, 2, h, w) as
             :func:`.patch_generator.endpoint_cells`.
         """
         batch, side = start.size(0), self.cell * self.window
-        size = [batch, self.white_features.size(1), height, width]
-        features = torch.empty(size, device=start.device, memory_format=torch.channels_last)
-        features.copy_(self.white_features)
-        cells = torch.zeros(batch, 2, height, width, device=start.device)
-        # The first cell of each window, (column, row).
-        corners = ((torch.cat((start, goal)) - self.reach) / self.cell).floor().clamp(min=0.0)
-        corners[:, 0].clamp_(max=width - self.window)
-        corners[:, 1].clamp_(max=height - self.window)
-        shift = self.cell * corners
+        height, width = map_features.size(2) // 2, map_features.size(3) // 2
+        size = height * width
+        features = self.white_features.repeat(batch * size, 1, 1, 1)
+        # The first cell of each window: those around the starts, then those around the goals.
+        corners = ((torch.cat((start, goal)) - self.reach) / self.cell).floor()
+        left = corners[:, :1].clamp(0.0, float(width - self.window))
+        top = corners[:, 1:].clamp(0.0, float(height - self.window))
+        shift = self.cell * torch.cat((left, top), 1)
         windows = point_image(start.repeat(2, 1) - shift, goal.repeat(2, 1) - shift, side, side)
-        window_features = self.point_stem(tiles_of(windows, self.cell)).permute(0, 3, 1, 2)
+        window_features = self.point_stem(tiles_of(windows, self.cell))
         window_cells = endpoint_cells(windows, self.cell)
-        first_cells: list[list[int]] = corners.long().tolist()
-        for i in range(2 * batch):
-            task, endpoint = i % batch, i // batch
-            left, top = first_cells[i]
-            right, bottom = left + self.window, top + self.window
-            features[task, :, top:bottom, left:right] = window_features[i]
-            cells[task, endpoint, top:bottom, left:right] = window_cells[i, endpoint]
-        return features, cells
+        # The number of each cell of the windows in its map, (2 B, window, window).
+        inside = torch.arange(self.window, device=start.device)
+        rows, columns = top.long() + inside, left.long() + inside
+        numbers = (rows * width).unsqueeze(2) + columns.unsqueeze(1)
+        tasks = torch.arange(batch, device=start.device).view(-1, 1, 1)
+        task_numbers = (numbers + (size * tasks).repeat(2, 1, 1)).flatten()
+        features[task_numbers] = window_features.flatten(0, 2)[:, :, None, None]
+        cells = torch.zeros(2 * batch * size, device=start.device)
+        cells[(numbers[:batch] + 2 * size * tasks).flatten()] = window_cells[:batch, 0].flatten()
+        cells[(numbers[batch:] + 2 * size * tasks + size).flatten()] = window_cells[
+            batch:, 1
+        ].flatten()
+        features = features.view(batch, height, width, -1).permute(0, 3, 1, 2)
+        return features, cells.view(batch, 2, height, width)
 
 
 def tiles_of(images: Tensor, size: int) -> Tensor:

@@ -88,11 +88,36 @@ class PatchGenerator(nn.Module):
         Returns:
             (B, stem, h, w).
         """
-        half = torch.relu(self.norm(self.merge(map_features) + point_features))
-        features: Tensor = self.trunk(half)
-        if self.wavefront is not None and self.fuse is not None:
-            blocked = 1 - functional.avg_pool2d(free, self.cell)
-            closeness = self.wavefront(features, blocked, endpoints)
+        features = self.cell_features(self.merge(map_features) + point_features)
+        closeness: Tensor | None = None
+        if self.wavefront is not None:
+            closeness = self.wavefront(features, self.blocked(free), endpoints)
+        return self.patch_features(features, closeness, map_features)
+
+    def cell_features(self, merged: Tensor) -> Tensor:
+        """Return the features of the cells before the wavefront, (B, width, h / 2, w / 2).
+
+        Args:
+            merged: the sum of the merged map features and the point features, of the same shape.
+        """
+        features: Tensor = self.trunk(torch.relu(self.norm(merged)))
+        return features
+
+    def blocked(self, free: Tensor) -> Tensor:
+        """Return the fraction of each cell that obstacles cover, (B, 1, h / 2, w / 2)."""
+        return 1 - functional.avg_pool2d(free, self.cell)
+
+    def patch_features(
+        self, features: Tensor, closeness: Tensor | None, map_features: Tensor
+    ) -> Tensor:
+        """Return the features of the patches, as :meth:`features`.
+
+        Args:
+            features: from :meth:`cell_features`.
+            closeness: of the wavefront, where there is one.
+            map_features: as for :meth:`features`.
+        """
+        if closeness is not None and self.fuse is not None:
             features = torch.relu(features + self.fuse(closeness.to(features.dtype)))
         patches = functional.pixel_shuffle(self.split(features), 2)
         refined: Tensor = self.refine(torch.relu(patches + map_features))
@@ -112,7 +137,8 @@ class PatchGenerator(nn.Module):
         batch, height, width = features.size(0), features.size(2), features.size(3)
         tiles = torch.sigmoid(self.head(features.permute(0, 2, 3, 1)))
         tiles = tiles.view(batch, height, width, self.patch, self.patch).transpose(2, 3)
-        region = tiles.reshape(free.size())
+        size = [batch, 1, height * self.patch, width * self.patch]
+        region = tiles.reshape(size)
         return region * free if self.white_obstacles else region
 
 

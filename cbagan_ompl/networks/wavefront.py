@@ -8,6 +8,8 @@ by steps with shared weights until nothing changes.
 
 from __future__ import annotations
 
+import math
+
 import torch
 from torch import Tensor, nn
 
@@ -51,21 +53,57 @@ class Wavefront(nn.Module):
         Returns:
             (B, 2 C, H, W) in [0, 1]; 1 on the cheapest paths. The C sharp ones come first.
         """
-        edges = (self.costs(features).float() + self.wall_costs * blocked).clamp(-3.0, 6.0).exp()
+        return self.closeness(
+            self.distances(self.edge_costs(features, blocked), endpoints), features.size(0)
+        )
+
+    def edge_costs(self, features: Tensor, blocked: Tensor) -> Tensor:
+        """Return the costs of the steps between neighbouring cells.
+
+        Args:
+            features: (B, channels, H, W).
+            blocked: (B, 1, H, W), fraction of each cell that obstacles cover.
+
+        Returns:
+            (4, H, W, B C), as :func:`step_costs` takes them: C cost maps of each task.
+        """
+        logarithms: Tensor = self.costs(features).float() + self.wall_costs * blocked
+        edges = logarithms.clamp(-3.0, 6.0).exp()
         batch, height, width = edges.size(0), edges.size(2), edges.size(3)
         # Cells first, then tasks and cost maps: every operation works on long rows.
         edges = edges.view(batch, 4, -1, height, width).permute(1, 3, 4, 0, 2)
-        costs = step_costs(edges.flatten(3))
+        return edges.flatten(3)
+
+    def distances(self, edges: Tensor, endpoints: Tensor) -> Tensor:
+        """Return the distance fields of start and goal, with gradients in training.
+
+        Args:
+            edges: (4, H, W, B C), from :meth:`edge_costs`.
+            endpoints: (B, 2, H, W), as for :meth:`forward`.
+
+        Returns:
+            (2, H, W, B C).
+        """
+        costs = step_costs(edges)
         at_endpoint = endpoints.permute(1, 2, 3, 0) > 0
-        cost_maps = costs.size(3) // batch
+        cost_maps = costs.size(3) // endpoints.size(0)
         source = at_endpoint.unsqueeze(4).expand(-1, -1, -1, -1, cost_maps).flatten(3)
         distance = distance_fields(costs.detach(), source, self.steps)
-        if self.training:
-            distance = differentiable_distances(distance, costs, source)
-        through = distance.sum(0).view(height, width, batch, cost_maps).permute(2, 3, 0, 1)
+        return differentiable_distances(distance, costs, source) if self.training else distance
+
+    def closeness(self, distance: Tensor, batch: int) -> Tensor:
+        """Return the features of the cells, see :meth:`forward`.
+
+        Args:
+            distance: (2, H, W, B C), from :meth:`distances`.
+            batch: B.
+        """
+        height, width = distance.size(1), distance.size(2)
+        through = distance.sum(0).view(height, width, batch, -1).permute(2, 3, 0, 1)
         best = through.amin((2, 3), keepdim=True)
         detour = (through - best) / (best + 1.0)
-        return torch.cat((torch.exp2(-20.0 * detour), torch.exp2(-4.0 * detour)), 1)
+        # 2^(-x) as an exponential function of base e, which ONNX has.
+        return torch.exp(-math.log(2) * torch.cat((20.0 * detour, 4.0 * detour), 1))
 
 
 def step_costs(edges: Tensor) -> Tensor:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import ConfigError, ModelError, show
 from ..maps.grid_map import GridMap
-from ..maps.grid_search import COMPILED, SCIPY, prepare_search, search_kind
+from ..maps.grid_search import prepare_search
 from ..sampling.heatmap import Heatmap
 
 if TYPE_CHECKING:
@@ -35,12 +35,13 @@ SAMPLERS = {
     UNIFORM: "OMPL's own, untouched",
     CORRIDOR: "a band around the path of a grid search",
     "straight-line": "a band around the straight line from start to goal",
+    "flat": "a heat map that is 1 on all free space",
     AUTO: "learned or corridor, whichever is there sooner on a map of this size",
 }
 
-# Pixels up to which the grid search makes its heat map sooner than the network, by what searches;
-# measured by scripts/search_speed.py, see docs/results/choices.md.
-_MOST_CORRIDOR_PIXELS = {COMPILED: 1200 * 1200, SCIPY: 150 * 150}
+# Pixels up to which the grid search makes its heat map sooner than the network; measured by
+# scripts/search_speed.py, see docs/results/choices.md.
+_MOST_CORRIDOR_PIXELS = 1200 * 1200
 
 #: What a result names its sampler when the caller brought the heat map.
 OWN_HEATMAP = "heatmap"
@@ -71,7 +72,7 @@ def resolve_auto(
     """
     if not (isinstance(sampler, str) and sampler == AUTO):
         return sampler, model
-    is_small = grid.free.size <= _MOST_CORRIDOR_PIXELS[search_kind()]
+    is_small = grid.free.size <= _MOST_CORRIDOR_PIXELS
     if is_small or find_spec("torch") is None:
         return CORRIDOR, None
     return LEARNED, model
@@ -140,4 +141,5 @@ def _on_grid(heatmap: Heatmap | ArrayLike, grid: GridMap) -> Heatmap:
 _CONTROLS: dict[str, HeatmapSource] = {
     CORRIDOR: Heatmap.corridor,
     "straight-line": Heatmap.straight_line,
+    "flat": lambda grid, *_: Heatmap.uniform(grid),
 }

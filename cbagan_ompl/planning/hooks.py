@@ -35,6 +35,8 @@ class PlannerTraits:
             when its termination condition is a Python function; None for no bindings.
         hangs_at_optimum: whether a solve never returns once it has a path as short as the straight
             line.
+        counts_iterations: whether it tells how many iterations it has done, in each of which it
+            adds one node at most.
         asks_in_thread: whether it asks its goal from a thread of its own, which hangs or crashes
             where the goal is written in Python.
     """
@@ -47,6 +49,7 @@ class PlannerTraits:
     samples_are_nodes: bool = False
     hangs_with: str | None = None
     hangs_at_optimum: bool = False
+    counts_iterations: bool = False
     asks_in_thread: bool = False
 
 
@@ -63,7 +66,7 @@ PLANNERS = {
     "BiEST": PlannerTraits(VALID_STATE_SAMPLER, stops_at_first=True),
     "EST": PlannerTraits(VALID_STATE_SAMPLER, stops_at_first=True),
     "FMT": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
-    "InformedRRTstar": PlannerTraits(GOAL_INJECTION),
+    "InformedRRTstar": PlannerTraits(GOAL_INJECTION, counts_iterations=True),
     "KPIECE1": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
     "LBKPIECE1": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
     "LBTRRT": PlannerTraits(STATE_SAMPLER),
@@ -86,11 +89,11 @@ PLANNERS = {
     "RRTConnect": PlannerTraits(
         STATE_SAMPLER, without_allocator=BOUNDS_STEERING, stops_at_first=True, is_greedy=True
     ),
-    "RRTXstatic": PlannerTraits(STATE_SAMPLER),
-    "RRTsharp": PlannerTraits(STATE_SAMPLER),
-    "RRTstar": PlannerTraits(GOAL_INJECTION),
+    "RRTXstatic": PlannerTraits(STATE_SAMPLER, counts_iterations=True),
+    "RRTsharp": PlannerTraits(STATE_SAMPLER, counts_iterations=True),
+    "RRTstar": PlannerTraits(GOAL_INJECTION, counts_iterations=True),
     "SBL": PlannerTraits(VALID_STATE_SAMPLER, stops_at_first=True),
-    "SORRTstar": PlannerTraits(GOAL_INJECTION, hangs_at_optimum=True),
+    "SORRTstar": PlannerTraits(GOAL_INJECTION, hangs_at_optimum=True, counts_iterations=True),
     "SPARS": PlannerTraits(**_ROADMAP, hangs_with="boost"),
     "SPARStwo": PlannerTraits(**_ROADMAP, hangs_with="boost"),
     "SST": PlannerTraits(STATE_SAMPLER),
@@ -194,6 +197,11 @@ def hangs_on_python_termination(planner: str) -> bool:
 def hangs_at_optimum(planner: str) -> bool:
     """Return whether a solve never returns once it has a path as short as the straight line."""
     return planner in PLANNERS and PLANNERS[planner].hangs_at_optimum
+
+
+def counts_iterations(planner: str) -> bool:
+    """Return whether a planner counts its iterations, each of which adds a node at most."""
+    return planner in PLANNERS and PLANNERS[planner].counts_iterations
 
 
 def asks_in_thread(planner: str) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from math import inf
+from math import inf, isfinite
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
@@ -18,11 +18,12 @@ from ..sampling.heatmap import Heatmap
 from ..sampling.options import SamplerOptions
 from . import compat
 from .attach import Attachment, attach
-from .compat import ob, ou
+from .benchmark_checks import GuardedChecker, WatchedMotions
+from .compat import ou
 from .heatmap_sources import HeatmapSource
 from .hooks import check_planner, hangs_at_optimum
+from .improvements import Improvement
 from .interrupt_guard import InterruptGuard
-from .monitor import CostHistory
 from .paths import checked_path, path_cost
 from .problem import (
     make_setup,
@@ -32,10 +33,6 @@ from .problem import (
     stop_at_optimum,
 )
 from .workspace import Endpoints, Workspace
-
-# Collision checks between two looks at the best cost: about six iterations of RRT*, half a
-# millisecond.
-_LOOK_EVERY = 32
 
 # Points of the progress data that OMPL records for each run, and their least distance in time.
 _UPDATES, _LEAST_UPDATE_S = 50, 0.001
@@ -52,12 +49,16 @@ class PlannerVariant:
         sampler: what the sampler is called.
         source: makes the heat map of a task; None for OMPL's own sampler.
         parameters: (name, value) of parameters of the planner, see :func:`.set_parameter`.
+        sampler_changes: (field, value) of sampler options that differ from those of the runs.
+        simplify: whether OMPL's path simplifier shortens the path after a run.
     """
 
     planner: str
     sampler: str
     source: HeatmapSource | None
     parameters: tuple[tuple[str, Any], ...] = ()
+    sampler_changes: tuple[tuple[str, Any], ...] = ()
+    simplify: bool = False
 
     @property
     def name(self) -> str:
@@ -73,16 +74,28 @@ class RunRecord:
         inference_s: making the heat map and attaching it; 0 for OMPL's own sampler.
         sample_counts: samples that the planner had, learned and uniform.
         collision_checks: motions that were checked.
-        cost: length of the path where it is exact and passed the check again, otherwise infinite.
-        costs: (seconds, cost) of each better solution that was seen while the planner planned;
-            empty for planners that do not tell the cost of their best solution.
+        cost: length of the planner's path where it is exact and passed the check again, otherwise
+            infinite.
+        improvements: each better solution that was seen while the planner planned; empty for
+            planners that do not tell the cost of their best solution.
+        nodes: that the planner has added; None where that is not told.
+        simplify_s: seconds in OMPL's path simplifier; None where it was not called.
+        simplified_cost: length of the path afterwards, as ``cost``; infinite where it was not.
     """
 
     inference_s: float
     sample_counts: dict[str, int]
     collision_checks: int
     cost: float
-    costs: list[tuple[float, float]]
+    improvements: list[Improvement]
+    nodes: int | None = None
+    simplify_s: float | None = None
+    simplified_cost: float = inf
+
+    @property
+    def final_cost(self) -> float:
+        """Length of the path that the run ends with."""
+        return self.cost if self.simplify_s is None else self.simplified_cost
 
 
 @dataclass(frozen=True)
@@ -227,8 +240,8 @@ class BenchmarkSession:
         self.setup = make_setup(workspace, endpoints, options.tolerance)
         si = self.setup.getSpaceInformation()
         checker, motions = workspace.make_checks(si)
-        self._states = _States(si, checker, guard)
-        self._motions = _Motions(si, motions)
+        self._states = GuardedChecker(si, checker, guard)
+        self._motions = WatchedMotions(si, motions)
         self.setup.setStateValidityChecker(self._states)
         si.setMotionValidator(self._motions)
         self.planners = {variant.name: self._planner(variant, options) for variant in variants}
@@ -236,8 +249,7 @@ class BenchmarkSession:
         self.setup.setPlanner(next(iter(self.planners.values())))
         self.records: dict[str, list[RunRecord]] = {variant.name: [] for variant in variants}
         self._workspace, self._endpoints, self._options = workspace, endpoints, options
-        self._planner_of = {variant.name: variant.planner for variant in variants}
-        self._sampler_of = {variant.name: variant.sampler for variant in variants}
+        self._variants = {variant.name: variant for variant in variants}
         self._sources = {e.sampler: e.source for e in variants if e.source is not None}
         self._heatmaps: dict[str, tuple[Heatmap, float]] = {}
         # One generator for all runs, so that each has other samples.
@@ -265,21 +277,22 @@ class BenchmarkSession:
 
     def before_run(self, planner: Any) -> None:
         """Attach the planner of a run: Benchmark's pre-run event, which has cleared it."""
-        name = planner.getName()
-        instance = self.planners[name]
+        variant = self._variants[planner.getName()]
+        instance = self.planners[variant.name]
         self._inference_s = 0.0
-        if self._sampler_of[name] in self._heatmaps:
-            heatmap, made_in = self._heatmaps[self._sampler_of[name]]
+        if variant.sampler in self._heatmaps:
+            heatmap, made_in = self._heatmaps[variant.sampler]
+            options = replace(self._sampler_options, **dict(variant.sampler_changes))
             self.setup.setPlanner(instance)
             began = perf_counter()
-            self._attachment = attach(self.setup, heatmap, self._sampler_options)
+            self._attachment = attach(self.setup, heatmap, options)
             self._inference_s = made_in + perf_counter() - began
         # The objective is that of all planners, and the threshold that of one of them.
-        if hangs_at_optimum(self._planner_of[name]):
+        if hangs_at_optimum(variant.planner):
             stop_at_optimum(self.setup, self._endpoints, self._options.tolerance)
         else:
             search_to_the_end(self.setup)
-        self._motions.begin_run(instance)
+        self._motions.begin_run(instance, variant.planner)
 
     def after_run(self, planner: Any, _: Any) -> None:
         """Record a run: Benchmark's post-run event.
@@ -289,13 +302,23 @@ class BenchmarkSession:
         counts = {"learned": 0, "uniform": 0}
         if self._attachment is not None:
             counts = self._attachment.sample_counts
-        costs = self.end_run()
-        self.records[planner.getName()].append(
-            RunRecord(self._inference_s, counts, self._motions.checks, self._cost(), costs)
-        )
+        checks, nodes = self._motions.checks, self._motions.nodes
+        improvements = self.end_run()
+        cost = self._cost()
+        record = RunRecord(self._inference_s, counts, checks, cost, improvements, nodes)
+        variant = self._variants[planner.getName()]
+        if variant.simplify and isfinite(cost):
+            record = self._simplify(record)
+        self.records[variant.name].append(record)
 
-    def end_run(self) -> list[tuple[float, float]]:
-        """Detach and let go of the planner; return the costs that were seen.
+    def _simplify(self, record: RunRecord) -> RunRecord:
+        began = perf_counter()
+        self.setup.simplifySolution()
+        seconds = perf_counter() - began
+        return replace(record, simplify_s=seconds, simplified_cost=self._cost())
+
+    def end_run(self) -> list[Improvement]:
+        """Detach and let go of the planner; return the improvements that were seen.
 
         To be called at the end too, because after an exception there is no post-run event.
         """
@@ -309,42 +332,3 @@ class BenchmarkSession:
             return inf
         path = checked_path(self.setup, self._workspace, self._endpoints, self._options.tolerance)
         return inf if path is None else path_cost(self.setup, self._workspace, path)
-
-
-class _States(ob.StateValidityChecker):  # type: ignore[misc]
-    """Call nothing valid any more once the guard has tripped, so that runs end at once."""
-
-    def __init__(self, si: Any, checker: Any, guard: InterruptGuard) -> None:
-        super().__init__(si)
-        self._is_valid = checker.isValid
-        self._guard = guard
-
-    def isValid(self, state: Any) -> bool:  # noqa: N802
-        return not self._guard.tripped and bool(self._is_valid(state))
-
-
-class _Motions(ob.MotionValidator):  # type: ignore[misc]
-    """Count the checks of a run, and now and then look at the best cost."""
-
-    def __init__(self, si: Any, motions: Any) -> None:
-        super().__init__(si)
-        self._check = motions.checkMotion
-        self.checks = 0
-        self._history: CostHistory | None = None
-
-    def begin_run(self, planner: Any) -> None:
-        self.checks = 0
-        self._history = CostHistory(planner)
-
-    def end_run(self) -> list[tuple[float, float]]:
-        """Return the costs that were seen; let go of the planner, which keeps this object alive."""
-        costs = [] if self._history is None else self._history.costs
-        self._history = None
-        return costs
-
-    def checkMotion(self, s1: Any, s2: Any, *last_valid: Any) -> bool:  # noqa: N802
-        self.checks += 1
-        if self._history is not None and self.checks % _LOOK_EVERY == 0:
-            self._history.look()
-        valid: bool = self._check(s1, s2, *last_valid)
-        return valid

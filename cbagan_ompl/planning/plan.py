@@ -22,7 +22,6 @@ from ..common.validation import (
 from ..errors import ConfigError, MapError, RobotError, show
 from ..maps.endpoints import Moves
 from ..maps.grid_map import GridMap
-from ..maps.grid_search import search_kind
 from ..robots.robot import Robot
 from ..sampling.heatmap import Heatmap
 from ..sampling.options import SamplerOptions
@@ -31,7 +30,6 @@ from .attach import Attachment, attach
 from .compat import ou
 from .goals import heatmap_of_goals, reached_goal, set_goals, split_goals
 from .heatmap_sources import (
-    CORRIDOR,
     LEARNED,
     UNIFORM,
     HeatmapSource,
@@ -281,7 +279,6 @@ def _result(
         status=run.status,
         planner=job.planner,
         sampler=job.sampler,
-        grid_search=search_kind() if job.sampler in (CORRIDOR, LEARNED) else None,
         hook=attachment.hook if attachment else None,
         ompl_version=compat.ompl_version(),
         seed=job.seed,

@@ -25,10 +25,8 @@ class PlanResult:
         solved: the planner found an exact solution, and every edge of it passed the check again.
         status: OMPL's own word on the run.
         planner: OMPL's name of the planner.
-        sampler: ``"learned"``, ``"uniform"``, ``"corridor"``, ``"straight-line"`` or
-            ``"heatmap"`` (the caller's own).
-        grid_search: ``"compiled"`` or ``"SciPy"``, what makes corridors, and connects the regions
-            of the learned sampler; None for other samplers.
+        sampler: ``"learned"``, ``"uniform"``, ``"corridor"``, ``"straight-line"``,
+            ``"flat"`` or ``"heatmap"`` (the caller's own).
         hook: by which hook the planner was reached; None for the uniform sampler.
         ompl_version: of the installed package.
         seed: what makes the samples of this run again.
@@ -80,7 +78,6 @@ class PlanResult:
     status: str
     planner: str
     sampler: str
-    grid_search: str | None
     hook: str | None
     ompl_version: str
     seed: int

@@ -75,7 +75,7 @@ class RobotMotionValidator(ob.MotionValidator):  # type: ignore[misc]
     and ReedsSheppStateSpace, as OMPL interpolates them. No step width: a collision is never
     missed. A motion along which the robot comes nearer to an obstacle than
     :data:`cbagan_ompl.robots.pieces.CONSERVATISM` pixels may be refused; straight motions
-    without a turn are exact. Where numba is installed it compiles the check of straight motions,
+    without a turn are exact. The check of straight motions is compiled,
     which takes seconds once and is kept on disk.
 
     Args:

@@ -1,16 +1,15 @@
-"""Straight motions of a shape, compiled by numba: the same answers as in Python, many times sooner.
+"""Straight motions of a shape, compiled: the same answers as in Python, many times sooner.
 
-The algorithm is that of :mod:`.shape_checker`, which explains it and takes this one where numba is
-installed; the tests hold the two together.
+The algorithm is that of :mod:`.shape_checker`, which explains it; the tests hold the two together.
 """
 
 from __future__ import annotations
 
+from functools import partial
 from math import cos, inf, pi, sin
 from typing import Any
 
-from numba import njit
-
+from ..common.compilation import compiled
 from .clearance_tables import BLOCKED, CLEAR, STEP, UNKNOWN
 
 TURN = 2 * pi
@@ -25,7 +24,7 @@ _SIGNATURE = (
 _MOST_GAPS = 32
 
 
-@njit(cache=True)
+@compiled
 def _note(scratch: Any, gaps: int, low: float, high: float) -> None:
     if gaps < _MOST_GAPS:
         scratch[0, gaps] = low
@@ -35,7 +34,7 @@ def _note(scratch: Any, gaps: int, low: float, high: float) -> None:
         scratch[1, _MOST_GAPS - 1] = high
 
 
-@njit(cache=True)
+@compiled
 def _region_is_free(  # noqa: C901 - one loop on purpose
     xs: Any, ys: Any, count: int, margin: float, runs: Any, scratch: Any
 ) -> bool:
@@ -80,7 +79,7 @@ def _region_is_free(  # noqa: C901 - one loop on purpose
     return True
 
 
-@njit(cache=True)
+@compiled
 def _swept_is_free(
     motion: Any,
     low: float,
@@ -114,12 +113,12 @@ def _swept_is_free(
     return True
 
 
-@njit(cache=True)
+@compiled
 def _excess(radius: float, diameter: float, angle: float) -> float:
     return diameter * angle / 4 + 3 * radius * angle * angle / 6
 
 
-@njit(cache=True)
+@compiled
 def _gap_is_free(
     motion: Any,
     low: float,
@@ -153,7 +152,7 @@ def _gap_is_free(
     return True
 
 
-@njit(cache=True)
+@compiled
 def _motion_is_free(  # noqa: C901 - one loop on purpose
     motion: Any,
     tables: Any,
@@ -210,7 +209,7 @@ def _motion_is_free(  # noqa: C901 - one loop on purpose
     return wanted + 1
 
 
-@njit(_SIGNATURE, cache=True)
+@partial(compiled, signature=_SIGNATURE)
 def straight_is_free(
     x0: float,
     y0: float,

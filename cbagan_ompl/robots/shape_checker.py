@@ -86,20 +86,16 @@ class ShapeChecker:
         _KEPT.append(checker)
         return checker
 
-    def compile(self) -> bool:
-        """Let numba compile the check of straight motions; return False without numba.
+    def compile(self) -> None:
+        """Compile the check of straight motions. Answers do not change.
 
         The first time takes seconds; the result is kept on disk, and later processes load it.
-        Answers do not change.
         """
         if self._compiled is None:
-            try:
-                from .compiled import straight_is_free
-            except ImportError:
-                return False
+            from .compiled import straight_is_free
+
             self._buffers = self._make_buffers()
             self._compiled = straight_is_free
-        return True
 
     def pose_is_free(self, x: float, y: float, yaw: float) -> bool:
         """Return whether the robot at a pose touches nothing; world coordinates."""
@@ -198,7 +194,7 @@ class ShapeChecker:
         """Return all arguments of the compiled check but the motion."""
         shape, tables = self.shape, self.tables
         height, width = self.grid.shape
-        # A copy, since what numba compiles takes no read-only arrays.
+        # A copy, since compiled functions take no read-only arrays.
         runs = np.frombuffer(self._runs.lengths, np.uint16).reshape(height, width).copy()
         counts = [len(part) for part in shape.parts]
         constants = (

@@ -6,15 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..maps.grid_map import GridMap
-from ..maps.grid_search import COMPILED, SCIPY, search_kind, shortest_path
+from ..maps.grid_search import shortest_path
 from .bands import half_width, paint_band
 from .pixels import pixel_pair
 
 # Half width of a bridge, which is kept narrow, as a fraction of the map's longer side.
 _BRIDGE_FRACTION = 0.015
 
-# Longest side of the coarse grid in which bridges are looked for, by what searches.
-_REPAIR_SIZES = {COMPILED: 128, SCIPY: 64}
+# Longest side of the coarse grid in which bridges are looked for.
+_REPAIR_SIZE = 128
 
 # Cost of a pixel length inside the region, relative to one where the heat map is 0.
 _REGION_COST = 0.02
@@ -38,8 +38,7 @@ def bridge(
         (H, W).
     """
     cost = np.where(region, np.float32(_REGION_COST), 1 + _REGION_COST - values)
-    coarse_size = _REPAIR_SIZES[search_kind()]
-    pixels = shortest_path(grid.free, *pixel_pair(endpoints), cost, coarse_size)
+    pixels = shortest_path(grid.free, *pixel_pair(endpoints), cost, _REPAIR_SIZE)
     assert pixels is not None, "the endpoints are connected"
     band = paint_band(grid.shape, pixels + np.float64(0.5), half_width(grid, _BRIDGE_FRACTION))
     return np.maximum(values, band)

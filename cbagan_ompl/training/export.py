@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import datetime
 import hashlib
-import io
 import json
-import warnings
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -20,13 +18,17 @@ from ..errors import ModelError, show
 from ..inference.model_files import (
     MANIFEST,
     MAX_NAME_LENGTH,
-    RECORD_NAME,
     RECORD_SCHEMA,
     is_model,
     read_manifest,
+    read_record,
 )
-from ..networks.export_model import RegionModel
+from ..networks.export_model import make_region_model
+from ..networks.generator import Generator
+from ..networks.patch_generator import PatchGenerator
 from .checkpoints import best_generator, load_checkpoint
+from .model_weights import recover_generator
+from .torchscript import save_script
 
 INPUTS = (
     "free: float (B, 1, H, W) in [0, 1], 1 where free, any H and W; "
@@ -56,7 +58,8 @@ def export(
     ``manifest.json``, which names the default model and the SHA-256 of each.
 
     Args:
-        checkpoint: a file that :func:`cbagan_ompl.training.loop.train` wrote.
+        checkpoint: a file that :func:`cbagan_ompl.training.loop.train` wrote; or an exported model,
+            whose weights are recovered, to write it in the form of this version.
         path: the file to write; its suffix is ``.pt``.
         note: what the checkpoint cannot tell, for the record and the card: the origin of the data,
             and the licences of data and model.
@@ -77,18 +80,41 @@ def export(
             f"a model cannot be called {show(target.stem)}: its name is printable and has at most "
             f"{MAX_NAME_LENGTH} characters"
         )
-    state = load_checkpoint(checkpoint)
-    generator = best_generator(state, checkpoint)
-    record = make_record(target.stem, state, generator, note)
+    generator, record = _read_source(Path(checkpoint), target.stem, note)
     make_folder(target.parent, ModelError)
     _check_outputs(target, as_path(checkpoint), force)
-    model = RegionModel(generator).eval()
+    model = make_region_model(generator)
     # Convolutions in this layout take four fifths of the time on a CPU.
     model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
     save_script(model, target, record)
     write_atomically(target.with_suffix(".md"), model_card(record), ModelError)
     _update_manifest(target, force)
     return record
+
+
+def _read_source(
+    path: Path, name: str, note: str
+) -> tuple[Generator | PatchGenerator, dict[str, Any]]:
+    """Return the generator of a checkpoint or of an exported model, and the record of its export.
+
+    Args:
+        path: of the file.
+        name: of the model to be written.
+        note: see :func:`export`; an exported model keeps its own where there is none.
+    """
+    if not is_model(path):
+        state = load_checkpoint(path)
+        generator = best_generator(state, path)
+        return generator, make_record(name, state, generator, note)
+    record = read_record(path)
+    record |= {"name": name, "note": note or record.get("note", ""), **_origin()}
+    return recover_generator(path), record
+
+
+def _origin() -> dict[str, str]:
+    """Return what a record says of an export that is made now."""
+    date = datetime.datetime.now(datetime.timezone.utc).date()
+    return {"torch": str(torch.__version__), "date": date.isoformat()}
 
 
 def _check_outputs(model: Path, checkpoint: Path, force: bool) -> None:
@@ -120,29 +146,6 @@ def _is_manifest(path: Path) -> bool:
         return False
 
 
-def save_script(model: nn.Module, path: Path, record: dict[str, Any]) -> None:
-    """Write what :func:`script_bytes` returns.
-
-    Raises:
-        ModelError: the file cannot be written.
-    """
-    write_atomically(path, script_bytes(model, record), ModelError)
-
-
-def script_bytes(model: nn.Module, record: dict[str, Any]) -> bytes:
-    """Compile and freeze a module in evaluation mode; return its file, with the record inside."""
-    with warnings.catch_warnings():
-        # TorchScript is deprecated in favour of torch.export, but it is the form that this
-        # package's models have, and torch goes on reading and writing it.
-        warnings.simplefilter("ignore", DeprecationWarning)
-        # No optimize_for_inference: what it writes cannot be loaded again.
-        frozen = torch.jit.freeze(torch.jit.script(model))
-        extra = {RECORD_NAME: json.dumps(record, indent=1)}
-        buffer = io.BytesIO()
-        torch.jit.save(frozen, buffer, _extra_files=extra)
-    return buffer.getvalue()
-
-
 def make_record(
     name: str, state: dict[str, Any], generator: nn.Module, note: str = ""
 ) -> dict[str, Any]:
@@ -172,8 +175,7 @@ def make_record(
             "test": state.get("test"),
             "trivial": state.get("trivial"),
         },
-        "torch": str(torch.__version__),
-        "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
+        **_origin(),
     }
 
 

@@ -26,13 +26,13 @@ from ..inference.bundled_models import find_model
 from ..inference.model_files import is_model, load_script
 from ..inference.predictor import load_model
 from ..networks.config import NetworkConfig
-from ..networks.export_model import PatchModel, RegionModel
+from ..networks.export_model import PatchModel, RegionModel, make_region_model
 from ..networks.factory import make_generator
 from ..networks.generator import Generator
 from ..networks.patch_generator import PatchGenerator
 from .batches import encode, make_batch
 from .checkpoints import load_checkpoint
-from .export import script_bytes
+from .torchscript import script_bytes
 
 # Options of the architecture that records of earlier versions call otherwise.
 _FORMER_NAMES = {"metrics": "cost_maps"}
@@ -77,7 +77,7 @@ def recover_generator(path: Path) -> Generator | PatchGenerator:
     generator = make_generator(_architecture(model.record)).eval()
     try:
         _take_over(generator, _weights_of(model.module, generator))
-        error = _largest_difference(RegionModel(generator).eval(), model.module, generator.stride)
+        error = _largest_difference(make_region_model(generator), model.module, generator.stride)
     except (ValueError, RuntimeError, KeyError) as cause:
         raise ModelError(f"{path}: its weights cannot be recovered ({cause})") from cause
     if not error < _TOLERANCE:
@@ -138,7 +138,7 @@ def _take_over(generator: Generator | PatchGenerator, weights: list[Tensor]) -> 
     for buffer in generator.buffers():
         if buffer.is_floating_point():
             buffer.uniform_(0.5, 1.5)
-    region = RegionModel(generator).eval()
+    region = make_region_model(generator)
     script = load_script(script_bytes(region, {}))
     own = _weights_of(script, generator)
     if [value.numel() for value in own] != [value.numel() for value in weights]:

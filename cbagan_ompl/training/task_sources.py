@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 from ..common.parallel import fork_server, prepare_worker, run_call, why_died
 from ..common.signals import interrupts_held
-from ..common.validation import require, whole_number
+from ..common.validation import whole_number
 from ..datasets.dataset import Dataset, Tasks
 from ..datasets.synthetic import (
     TASKS_PER_MAP,
@@ -174,10 +174,8 @@ def synthetic_source(
         schedule: how many.
 
     Raises:
-        MissingDependencyError: numba is not installed.
         DatasetError: a process has died.
     """
-    require("numba", "train")
     with interrupts_held():
         context = fork_server()
     others = set(active_children())

@@ -6,7 +6,7 @@ from helpers.benchmarks import Finished
 from helpers.logs import NO_SAMPLES, make_log, solved, unsolved
 
 from cbagan_ompl.benchmarking.measures import (
-    cost_history,
+    improvements_of,
     logged_costs,
     thresholds,
 )
@@ -24,8 +24,13 @@ def test_measures_of_a_run() -> None:
     assert first["cost at 100 ms REAL"] == first["cost at 250 ms REAL"] == "150"
     assert first["cost at 500 ms REAL"] == "109"
     assert first["cost at 1000 ms REAL"] == "101"
+    assert first["nodes at first solution INTEGER"] == "10"
+    assert first["nodes to 10 percent INTEGER"] == "20"
+    assert first["nodes to 5 percent INTEGER"] == "30"
+    assert first["nodes added INTEGER"] == "80"
     assert second["checked solution BOOLEAN"] == "0"
     assert {second[name] for name in first if "cost" in name or "to " in name} == {""}
+    assert second["nodes added INTEGER"] == "100"  # those at the end, since nobody tells
     assert log.parameters["best_known_cost REAL"] == "100"
     best_of_runs = make_log("m", {"RRTstar_learned": [run, unsolved()]})
     assert best_of_runs.parameters["best_known_cost REAL"] == "101"
@@ -39,10 +44,14 @@ def test_costs_come_from_the_log_where_the_planner_tells_none() -> None:
         {"time REAL": "0.4", "best cost REAL": "8"},
     ]
     record = RunRecord(0.0, NO_SAMPLES, 1, 7.5, [])
-    assert cost_history(record, points, 0.5) == [(0.2, 9.0), (0.4, 8.0), (0.5, 7.5)]
-    assert cost_history(record, (), 0.5) == [(0.5, 7.5)]
-    assert cost_history(unsolved(), points, 0.5) == []
+    history = [(0.2, 9.0, 60), (0.4, 8.0, 60), (0.5, 7.5, 60)]
+    assert improvements_of(record, points, 0.5, 60) == history
+    assert improvements_of(record, (), 0.5, 60) == [(0.5, 7.5, 60)]
+    assert improvements_of(unsolved(), points, 0.5, 60) == []
+    roadmap = [{**points[1], "milestone count INTEGER": "20"}]
+    assert improvements_of(record, roadmap, 0.5, 60) == [(0.2, 9.0, 20), (0.5, 7.5, 60)]
     run = {
+        "simplification time REAL": "0",
         "first solution time REAL": "0.15",
         "first solution cost REAL": "10",
         "checked solution cost REAL": "7.5",
@@ -81,3 +90,15 @@ def test_the_users_threshold_has_a_property_of_its_own() -> None:
     assert properties["time to 20 percent REAL"] == "0.3"
     assert properties["time to 10 percent REAL"] == "0.7"
     assert properties["time to 2 percent REAL"] == "0.7"
+
+
+def test_a_simplified_path_comes_after_the_first_one() -> None:
+    record = RunRecord(0.0, NO_SAMPLES, 1, 130.0, [], simplify_s=0.2, simplified_cost=104.0)
+    log = make_log("m", {"RRTConnect_uniform": [record]}, optimal_cost=100.0)
+    (run,) = log.planners[0].runs
+    assert run["first solution time REAL"] == "0.9"
+    assert run["first solution cost REAL"] == "130"
+    assert run["time to 5 percent REAL"] == "1.1"
+    assert run["checked solution cost REAL"] == "104"
+    assert run["simplification time REAL"] == "0.2"
+    assert logged_costs(run, ()) == [(0.9, 130.0), (1.1, 104.0)]

@@ -49,6 +49,9 @@ def test_the_threshold_is_the_users(within: int) -> None:
     }
     text = markdown(results, conditions)
     assert text.count(f"to {within} % of best") == 3
+    nodes = learned["measures"]
+    assert nodes["nodes_to_first"]["median"] == 10
+    assert nodes[f"nodes_to_{within}_percent"]["median"] == (30 if within == 5 else 20)
     assert "% of best" not in text.replace(f"to {within} % of best", "")
 
 
@@ -63,3 +66,26 @@ def test_failures_are_named_with_the_end_of_their_output() -> None:
         "low": None,
         "high": None,
     }
+
+
+def test_tasks_left_out_and_sources_are_named() -> None:
+    results = results_of([make_log("m", {"RRT_uniform": [unsolved()]})])
+    left_out = {f"city_{i}": "start and goal are the same" for i in range(12)}
+    conditions = Conditions(
+        "2.0.1",
+        1,
+        Settings(),
+        {},
+        "command",
+        left_out=left_out,
+        auto={"corridor": 2, "learned": 1},
+    )
+    report = markdown(results, conditions)
+    assert "Auto: corridor (2), learned (1)." in report
+    assert "12 tasks that cannot be planned for were left out." in report
+    assert "- city_9: start" in report
+    assert "city_10" not in report
+    assert "- and 2 more" in report
+    summary = summary_json(results, conditions)
+    assert summary["left_out"] == left_out
+    assert summary["auto"] == {"corridor": 2, "learned": 1}

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from cbagan_ompl import ConfigError
+from cbagan_ompl.benchmarking.sampler_variants import parse_sampler
 from cbagan_ompl.benchmarking.settings import Settings, parse_parameters
-from cbagan_ompl.sampling.options import Adaptation, HeadingSpread, SamplerOptions
+from cbagan_ompl.sampling.options import NO_ADAPTATION, Adaptation, HeadingSpread, SamplerOptions
 
 
 def test_parameters_from_texts() -> None:
@@ -47,6 +48,7 @@ def test_saved_settings_have_flat_keys() -> None:
             "turning_radius": None,
             "reverse": False,
         },
+        "simplify": [],
         "within": 5,
     }
 
@@ -72,7 +74,7 @@ def test_the_seed_of_a_benchmark_is_an_int(seed: Any) -> None:
         ({"samplers": ("uniform", "a\nb")}, "name of a sampler"),
         ({"samplers": ("uniform", "_a")}, "name of a sampler"),
         ({"samplers": ("uniform", "")}, "name of a sampler"),
-        ({"samplers": ("uniform", "a" * 41)}, "name of a sampler"),
+        ({"samplers": ("uniform", "a" * 81)}, "name of a sampler"),
         ({"samplers": ("uniform", "a\udcff")}, "name of a sampler"),
         ({"planners": ("RRT",) * 2}, "each once"),
     ],
@@ -93,3 +95,23 @@ def test_values_of_parameters_are_numbers_truth_values_or_words(value: str) -> N
     with pytest.raises(ConfigError, match=r"--set 'RRT\.range'") as caught:
         parse_parameters([f"RRT.range={value}"])
     assert len(str(caught.value)) < 1000
+
+
+def test_samplers_may_change_options() -> None:
+    settings = Settings(samplers=("uniform", "learned", "learned:adaptation=none", "flat"))
+    assert settings.sources == {"uniform", "learned", "flat"}
+    variant = settings.variants()[2]
+    assert (variant.name, variant.source) == ("learned:adaptation=none", "learned")
+    assert variant.changes == (("adaptation", NO_ADAPTATION),)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("learned:", "learned:adaptation", "learned:adaptation=magic", "learned:seed=1"),
+        *("learned:sharpness=x", "learned:uniform_fraction=0", "learned:sharpness=1:sharpness=2"),
+    ],
+)
+def test_options_of_samplers_that_make_no_sense(text: str) -> None:
+    with pytest.raises(ConfigError, match="sampler 'learned"):
+        parse_sampler(text)

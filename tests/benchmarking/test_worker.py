@@ -44,6 +44,7 @@ def test_auto_is_the_corridor_of_a_small_map(tmp_path: Path) -> None:
     run_job(Job(task, settings, tmp_path / "x.log"), lambda: None)
     log = parse_log((tmp_path / "x.log").read_text())
     assert log.planners[1].name == "geometric_RRT_auto"
+    assert log.parameters["auto VARCHAR"] == "corridor"
     assert int(log.planners[1].runs[0]["learned draws INTEGER"]) > 0
     assert record_inputs([task], settings)["model_hashes"].keys() == {"learned"}
 
@@ -68,3 +69,34 @@ def test_parameters_are_set(finished: Finished) -> None:
             assert "range = 10" in planner.settings
             bias = "0.1" if "RRTstar" in planner.name else "0.05"
             assert any(line.startswith(f"goal_bias = {bias}") for line in planner.settings)
+
+
+def test_variants_of_a_sampler_have_their_own_options(two_walls: GridMap, tmp_path: Path) -> None:
+    task = BenchmarkTask(Workspace(two_walls), 0, Task(START, GOAL))
+    samplers = ("uniform", "flat", "flat:adaptation=none:uniform_fraction=0.9")
+    settings = Settings(
+        ("RRTstar", "RRTConnect"), samplers, runs=2, time=0.3, range=20, simplify=("RRTConnect",)
+    )
+    run_job(Job(task, settings, tmp_path / "x.log"), lambda: None)
+    log = parse_log((tmp_path / "x.log").read_text())
+    assert "auto VARCHAR" not in log.parameters
+    rrtstar, connect = log.planners[:3], log.planners[3:]
+    counts = [
+        [int(planner.runs[0][f"{kind} draws INTEGER"]) for kind in ("learned", "uniform")]
+        for planner in rrtstar
+    ]
+    assert counts[1][0] > counts[1][1]
+    assert counts[2][1] > 5 * counts[2][0]
+    for planner in rrtstar:
+        for run in planner.runs:
+            # RRT* prunes nothing: what was counted is what is there.
+            added, there = (int(run[f"{name} INTEGER"]) for name in ("nodes added", "graph states"))
+            assert abs(added - there) <= 1
+            assert 1 < int(run["nodes at first solution INTEGER"]) <= added
+            assert run["simplification time REAL"] == "0"
+    for planner in connect:
+        for run in planner.runs:
+            assert run["nodes at first solution INTEGER"] == run["graph states INTEGER"]
+            assert float(run["simplification time REAL"]) > 0
+            first, final = run["first solution cost REAL"], run["checked solution cost REAL"]
+            assert float(final) < float(first)

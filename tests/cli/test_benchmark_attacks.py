@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -42,12 +43,11 @@ def files_in(folder: Path) -> set[str]:
 
 
 @pytest.fixture
-def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty folder for the temporary files of the commands."""
-    folder = tmp_path / "tmp"
-    folder.mkdir()
-    monkeypatch.setenv("TMPDIR", str(folder))
-    return folder
+def temporary(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """An empty folder for temporary files, with a name short enough for sockets."""
+    with tempfile.TemporaryDirectory() as folder:
+        monkeypatch.setenv("TMPDIR", folder)
+        yield Path(folder)
 
 
 def children_of(process: int) -> list[int]:
@@ -373,7 +373,7 @@ def test_sql_in_a_log_is_refused(
 @pytest.mark.slow
 def test_damaged_folders_are_read_or_refused(finished: Finished, tmp_path: Path) -> None:
     """What is made of logs and settings that pass the checks must not fail any more."""
-    tasks = select_tasks([finished.arguments[1]], finished.arguments[7])
+    tasks = select_tasks([finished.arguments[1]], finished.arguments[7]).tasks
     settings = Settings(
         ("RRT", "RRTstar"), ("uniform", "corridor"), 3, 0.1, 10.0, {"RRTstar": {"goal_bias": 0.1}}
     )
@@ -540,7 +540,7 @@ def test_a_task_that_needs_no_path(map_folder: Path, tmp_path: Path) -> None:
 
 
 def test_logs_are_those_of_their_task(finished: Finished) -> None:
-    tasks = select_tasks([finished.arguments[1]], finished.arguments[7])
+    tasks = select_tasks([finished.arguments[1]], finished.arguments[7]).tasks
     settings = Settings(
         ("RRT", "RRTstar"), ("uniform", "corridor"), 3, 0.1, 10.0, {"RRTstar": {"goal_bias": 0.1}}
     )
@@ -549,3 +549,19 @@ def test_logs_are_those_of_their_task(finished: Finished) -> None:
         check_log(log, job)
     with pytest.raises(CbaganOmplError, match="something else"):
         check_log(finished.logs[1], jobs[0])
+
+
+def test_a_temporary_folder_whose_name_is_too_long_for_sockets(
+    map_folder: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / ("long" * 30)
+    folder.mkdir()
+    done = subprocess.run(
+        [*COMMAND, *words_for(map_folder, tmp_path / "out")],
+        env={**os.environ, "TMPDIR": str(folder)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert "set TMPDIR to a folder with a shorter name" in done.stderr

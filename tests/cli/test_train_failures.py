@@ -18,7 +18,6 @@ from helpers.tiny_model import TINY, export_tiny_model
 from helpers.training_set import write_training_set
 
 pytest.importorskip("torch")
-pytest.importorskip("numba")
 
 # Only against hanging: a busy machine may take long.
 _PATIENCE_S = 120

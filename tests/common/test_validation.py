@@ -151,11 +151,11 @@ def test_at_least() -> None:
 
 
 def test_packages() -> None:
-    require("numpy", "train")
+    require("numpy", "torch")
     with pytest.raises(MissingDependencyError) as caught:
-        require("no_such_package_at_all", "train")
+        require("no_such_package_at_all", "torch")
     assert "this needs no_such_package_at_all, which cannot be imported" in str(caught.value)
-    assert "in the clone of cbagan-ompl with: pip install -e '.[train]'" in str(caught.value)
+    assert "in the clone of cbagan-ompl with: pip install -e '.[torch]'" in str(caught.value)
 
 
 def test_torch_is_named_where_it_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,8 +5,6 @@ from math import hypot, pi
 import numpy as np
 import pytest
 
-pytest.importorskip("numba")
-
 from cbagan_ompl.datasets.geodesic import distance_field
 
 

@@ -5,8 +5,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-pytest.importorskip("numba")
-
 from cbagan_ompl.datasets.geodesic import distance_field
 from cbagan_ompl.datasets.geodesic_labels import EPSILON, SLACK, geodesic_label
 from cbagan_ompl.maps.connectivity import connects

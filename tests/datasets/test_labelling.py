@@ -36,8 +36,6 @@ def test_square_maps() -> None:
 
 @pytest.mark.parametrize("label", ["rrt", "geodesic"])
 def test_own_maps_become_a_set(tmp_path: Path, label: str) -> None:
-    if label == "geodesic":
-        pytest.importorskip("numba")
     settings = GenerationSettings(**{**vars(SETTINGS), "label": label})
     label_maps(tmp_path / "one", own_maps(), settings, 1, False, progress=False)
     dataset = load_dataset(tmp_path / "one")

@@ -5,9 +5,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-pytest.importorskip("numba")
-
 from helpers.training_set import equal_tasks
 
 from cbagan_ompl import ConfigError

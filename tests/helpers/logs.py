@@ -7,6 +7,7 @@ from math import inf
 
 from cbagan_ompl.benchmarking.logs import ExperimentLog, PlannerLog
 from cbagan_ompl.benchmarking.measures import WITHIN_PERCENT, add_measures
+from cbagan_ompl.planning.improvements import Improvement
 from cbagan_ompl.planning.ompl_benchmark import RunRecord
 
 NO_SAMPLES = {"learned": 0, "uniform": 0}
@@ -37,7 +38,8 @@ def make_log(
 
 
 def solved(*costs: tuple[float, float], inference: float = 0.0, checks: int = 10) -> RunRecord:
-    return RunRecord(inference, NO_SAMPLES, checks, costs[-1][1], list(costs))
+    improvements = [Improvement(*cost, nodes=10 * (i + 1)) for i, cost in enumerate(costs)]
+    return RunRecord(inference, NO_SAMPLES, checks, costs[-1][1], improvements, nodes=80)
 
 
 def unsolved(inference: float = 0.0) -> RunRecord:

@@ -15,7 +15,7 @@ torch = pytest.importorskip("torch")
 from cbagan_ompl import ModelError
 from cbagan_ompl.inference import bundled_models, model_files
 from cbagan_ompl.inference.predictor import load_model
-from cbagan_ompl.training.export import save_script
+from cbagan_ompl.training.torchscript import save_script
 
 
 @pytest.fixture

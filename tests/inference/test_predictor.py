@@ -136,7 +136,7 @@ def test_lack_of_memory_is_said() -> None:
     def greedy(free: torch.Tensor, start: torch.Tensor, goal: torch.Tensor) -> torch.Tensor:
         return torch.empty(2**50)
 
-    with pytest.raises(ModelError, match=r"not enough memory .*\(1, 1, 64, 64\): give it fewer"):
+    with pytest.raises(ModelError, match=r"not enough memory .*\(1, 64, 64\): give it fewer"):
         Predictor(greedy, {"working_size": 64}).predict(GridMap(np.ones((64, 64))), (1, 1), (9, 9))
 
 

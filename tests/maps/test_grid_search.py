@@ -1,31 +1,11 @@
 from __future__ import annotations
 
-import sys
-
 import numpy as np
 import pytest
+from helpers.searches import search_graph
 
-from cbagan_ompl.maps import grid_search
 from cbagan_ompl.maps.grid_map import GridMap
-from cbagan_ompl.maps.grid_search import (
-    COMPILED,
-    SCIPY,
-    prepare_search,
-    pull_taut,
-    search_kind,
-    shortest_path,
-)
-
-
-@pytest.fixture(autouse=True, params=[COMPILED, SCIPY])
-def kind(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
-    """What searches, in all tests."""
-    if request.param == COMPILED:
-        pytest.importorskip("numba")
-    else:
-        monkeypatch.setattr(grid_search, "_load_compiled", lambda: None)
-    assert search_kind() == request.param
-    return str(request.param)
+from cbagan_ompl.maps.grid_search import prepare_search, pull_taut, shortest_path
 
 
 def length(path: np.ndarray) -> float:
@@ -61,12 +41,12 @@ def test_price_moves_the_path() -> None:
     assert path[:, 1].max() >= 8
 
 
-def test_large_grids_are_searched_in_a_band() -> None:
+def test_large_grids_with_costs_are_searched_in_a_band() -> None:
     free = np.ones((700, 900), bool)
     free[300:320, :800] = False
     free[500, 100:] = False
-    whole = grid_search._search_graph(free, (5, 5), (890, 690), np.ones(free.shape, np.float32))
-    path = shortest_path(free, (5, 5), (890, 690))
+    whole = search_graph(free, (5, 5), (890, 690), np.ones(free.shape, np.float32))
+    path = shortest_path(free, (5, 5), (890, 690), np.ones(free.shape, np.float32))
     assert path is not None
     assert whole is not None
     assert GridMap(free).path_is_free(path + 0.5)
@@ -115,7 +95,7 @@ def test_paths_are_the_cheapest(with_costs: bool) -> None:
         cost = np.ones((height, width), np.float32)
         if with_costs:
             cost = (0.02 + rng.random((height, width)) ** 4).astype(np.float32)
-        expected = grid_search._search_graph(free, start, goal, cost)
+        expected = search_graph(free, start, goal, cost)
         path = shortest_path(free, start, goal, cost if with_costs else None)
         assert (path is None) == (expected is None)
         if path is None or expected is None:
@@ -149,19 +129,9 @@ def test_masks_of_any_layout() -> None:
         np.testing.assert_array_equal(pull_taut(other, path), pull_taut(free, path))
 
 
-def test_preparing_needs_no_numba(kind: str) -> None:
+def test_what_is_prepared_searches_as_before() -> None:
     prepare_search()
     prepare_search(with_costs=True)
-    assert search_kind() == kind
-
-
-def test_without_numba_scipy_searches(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.undo()
-    monkeypatch.setitem(sys.modules, "numba", None)
-    monkeypatch.delitem(sys.modules, "cbagan_ompl.maps.compiled_search", raising=False)
-    monkeypatch.delattr("cbagan_ompl.maps.compiled_search", raising=False)
-    grid_search._load_compiled.cache_clear()
-    try:
-        assert search_kind() == SCIPY
-    finally:
-        grid_search._load_compiled.cache_clear()
+    path = shortest_path(np.ones((3, 4), bool), (0, 0), (3, 0))
+    assert path is not None
+    assert path.tolist() == [[0, 0], [1, 0], [2, 0], [3, 0]]

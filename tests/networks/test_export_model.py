@@ -12,7 +12,7 @@ from helpers.patches import clutter, generator
 from cbagan_ompl.networks.config import NETWORKS, NetworkConfig
 from cbagan_ompl.networks.export_model import ImageModel, PatchModel, RegionModel
 from cbagan_ompl.networks.factory import make_generator
-from cbagan_ompl.training.export import save_script
+from cbagan_ompl.training.torchscript import save_script
 
 
 def test_the_exported_model_gives_obstacles_no_probability() -> None:

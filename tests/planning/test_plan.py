@@ -26,8 +26,6 @@ from cbagan_ompl import (
     plan,
     tasks_of,
 )
-from cbagan_ompl.maps import grid_search
-from cbagan_ompl.maps.grid_search import COMPILED, SCIPY
 from cbagan_ompl.planning import compat, heatmap_sources
 from cbagan_ompl.planning.heatmap_sources import resolve_auto
 from cbagan_ompl.planning.hooks import hangs_on_python_termination
@@ -381,29 +379,22 @@ def resident() -> int:
 # --- the sampler "auto" -------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", [COMPILED, SCIPY])
-def test_auto_takes_the_corridor_on_small_maps(monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
-    if kind == COMPILED:
-        pytest.importorskip("numba")
-    else:
-        monkeypatch.setattr(grid_search, "_load_compiled", lambda: None)
+def test_auto_takes_the_corridor_on_small_maps() -> None:
     grid = GridMap(np.ones((100, 100), bool))
     result = plan(grid, (5, 5), (90, 90), "RRT", "auto", seed=1)
-    assert (result.sampler, result.grid_search) == ("corridor", kind)
-    assert result.to_dict()["grid_search"] == kind
+    assert result.sampler == "corridor"
     assert result.sample_counts["learned"] > 0
 
 
 def test_auto_takes_the_network_on_large_maps(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("torch")
-    monkeypatch.setattr(grid_search, "_load_compiled", lambda: None)
+    monkeypatch.setattr(heatmap_sources, "_MOST_CORRIDOR_PIXELS", 150 * 150)
     grid = GridMap(np.ones((200, 200), bool))
-    result = plan(grid, (5, 5), (190, 190), "RRT", "auto", seed=1)
-    assert (result.sampler, result.grid_search) == ("learned", SCIPY)
+    assert plan(grid, (5, 5), (190, 190), "RRT", "auto", seed=1).sampler == "learned"
 
 
 def test_auto_without_torch_takes_the_corridor(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(grid_search, "_load_compiled", lambda: None)
+    monkeypatch.setattr(heatmap_sources, "_MOST_CORRIDOR_PIXELS", 150 * 150)
     monkeypatch.setattr(heatmap_sources, "find_spec", lambda name: None)
     grid = GridMap(np.ones((200, 200), bool))
     assert resolve_auto("auto", "model.pt", grid) == ("corridor", None)
@@ -420,8 +411,3 @@ def test_auto_of_a_replanner(two_walls: GridMap) -> None:
 def test_auto_takes_no_heat_map(two_walls: GridMap) -> None:
     with pytest.raises(ConfigError, match="auto sampler uses no model and no heat map"):
         plan(two_walls, START, GOAL, "RRT", "auto", heatmap=np.ones(two_walls.shape))
-
-
-def test_other_samplers_search_nothing(two_walls: GridMap) -> None:
-    result = plan(two_walls, START, GOAL, "RRT", "straight-line", seed=1)
-    assert result.grid_search is None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from math import inf, nan, pi
 
 import numpy as np
@@ -121,8 +120,7 @@ def test_the_compiled_check_gives_the_same_answers(name: str, ros: bool) -> None
     grid = random_map(11, ros=ros)
     robot = scaled(ROBOTS[name], grid.resolution)
     plain, compiled = ShapeChecker(grid, robot), ShapeChecker(grid, robot)
-    pytest.importorskip("numba")
-    assert compiled.compile()
+    compiled.compile()
     rng = np.random.default_rng(12)
     answers = set()
     for _ in range(300):
@@ -141,13 +139,6 @@ def test_the_compiled_check_gives_the_same_answers(name: str, ros: bool) -> None
             motion[place] = value
             if place not in (2, 5) or robot.vertices is not None:
                 assert not compiled.straight_is_free(*motion)
-
-
-def test_without_numba_the_check_stays_in_python(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "cbagan_ompl.robots.compiled", None)
-    checker = ShapeChecker(GridMap(np.ones((20, 20))), Robot.rectangle(4, 2))
-    assert not checker.compile()
-    assert checker.straight_is_free(10, 10, 0, 12, 12, 1)
 
 
 def test_tables_that_are_worth_their_time_are_made_on_the_way() -> None:

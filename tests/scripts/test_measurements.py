@@ -21,12 +21,11 @@ def test_overhead() -> None:
 @pytest.mark.slow
 def test_search_speed(tmp_path: Path) -> None:
     pytest.importorskip("torch")
-    pytest.importorskip("numba")
     words = ("--sizes", "64", "--tasks", "1", "--json", str(tmp_path / "speed.json"))
     printed = run_script(SCRIPTS / "search_speed.py", *words)
-    assert printed.count("compiled") == 3
+    assert "64 px: path" in printed
     result = json.loads((tmp_path / "speed.json").read_text())
-    assert result["sizes"]["64"]["scipy_to_compiled"]["length"] == pytest.approx(1, abs=0.03)
+    assert all(value > 0 for value in result["sizes"]["64"]["ms"].values())
 
 
 @pytest.mark.slow

@@ -33,7 +33,7 @@ def test_paper_suite(folder: Path, tmp_path: Path) -> None:
     run_script(STUDIES / "paper_suite.py", str(folder), "--tasks", "7", "--output", str(output))
     words = (output / "tasks.args").read_text().splitlines()
     maps = words[: words.index("--tasks")]
-    tasks = select_tasks(maps, str(output / "tasks.csv"))
+    tasks = select_tasks(maps, str(output / "tasks.csv")).tasks
     assert len(tasks) == 7
     assert {task.task.family for task in tasks} <= {"original 0", "original 1", "original 2"}
     for task in tasks:

@@ -6,12 +6,13 @@ import shutil
 import warnings
 from pathlib import Path
 
+import numpy as np
 import pytest
 from helpers.tiny_model import TINY
 
 torch = pytest.importorskip("torch")
 
-from cbagan_ompl import ConfigError, ModelError
+from cbagan_ompl import ConfigError, GridMap, ModelError
 from cbagan_ompl.inference import model_files
 from cbagan_ompl.inference.predictor import load_model
 from cbagan_ompl.networks.export_model import RegionModel
@@ -95,9 +96,16 @@ def test_a_second_export_keeps_the_default(checkpoint: Path, tmp_path: Path) -> 
     assert load_model(tmp_path / "second.pt").record["name"] == "second"
 
 
-def test_export_of_what_is_no_checkpoint(exported: Path, tmp_path: Path) -> None:
-    with pytest.raises(ModelError, match="an exported model, not a training checkpoint"):
-        export(exported, tmp_path / "new.pt")
+def test_an_exported_model_is_written_anew(exported: Path, tmp_path: Path) -> None:
+    record = export(exported, tmp_path / "new.pt")
+    before = model_files.read_record(exported)
+    assert record == {**before, "name": "new", "date": record["date"]}
+    grid, task = GridMap(np.ones((32, 32))), ((3, 4), (28, 20))
+    old, new = (load_model(path).predict(grid, *task) for path in (exported, tmp_path / "new.pt"))
+    np.testing.assert_allclose(new.values, old.values, atol=1e-4)
+
+
+def test_export_of_what_is_no_checkpoint(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match="no such file"):
         export(tmp_path / "none.pt", tmp_path / "new.pt")
 

@@ -17,7 +17,6 @@ from cbagan_ompl.networks.export_model import RegionModel
 from cbagan_ompl.networks.factory import make_generator
 from cbagan_ompl.training.batches import encode, make_batch
 from cbagan_ompl.training.checkpoints import load_checkpoint
-from cbagan_ompl.training.export import save_script
 from cbagan_ompl.training.loop import train
 from cbagan_ompl.training.model_weights import (
     estimate_statistics,
@@ -25,6 +24,7 @@ from cbagan_ompl.training.model_weights import (
     starting_weights,
 )
 from cbagan_ompl.training.task_sources import DatasetSource
+from cbagan_ompl.training.torchscript import save_script
 
 ROOT = Path(__file__).parents[2]
 

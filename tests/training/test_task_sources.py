@@ -1,19 +1,15 @@
 from __future__ import annotations
 
 import json
-import sys
 from dataclasses import replace
 from multiprocessing import active_children
 
 import numpy as np
 import pytest
-
-pytest.importorskip("numba")
-
 from helpers.synthetic import FEW, SMALL, threaded_source
 from helpers.training_set import equal_tasks
 
-from cbagan_ompl import ConfigError, DatasetError, MissingDependencyError
+from cbagan_ompl import ConfigError, DatasetError
 from cbagan_ompl.datasets.synthetic import (
     TASKS_PER_MAP,
     SyntheticSettings,
@@ -61,15 +57,6 @@ def test_the_description_of_a_source_can_be_written() -> None:
     assert (description["name"], description["maps"], description["side"]) == ("synthetic", 2, 64)
     assert description["test_tasks"] == TASKS_PER_MAP
     assert description["synthetic"]["seed"] == 3
-
-
-def test_synthetic_maps_need_numba(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "numba", None)
-    with (
-        pytest.raises(MissingDependencyError, match=r"numba.*pip install -e '.\[train\]'"),
-        synthetic_source(SMALL, FEW),
-    ):
-        pass
 
 
 def test_a_process_that_dies_gives_a_clear_error() -> None:
