@@ -1,4 +1,4 @@
-"""The distance fields of :mod:`cbagan_ompl.networks.wavefront`, compiled. Needs numba.
+"""The distance fields of :mod:`cbagan_ompl.networks.wavefront`, compiled.
 
 Rows are relaxed from the top to the bottom and back, and each row along both of its directions, in
 place: what has changed spreads over the whole map in one pass where paths do not turn back. Such
@@ -11,8 +11,9 @@ over all paths.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ..common.compilation import compiled
 
 _DIAGONAL = np.float32(2**0.5)
 
@@ -51,7 +52,7 @@ def distance_fields(
     return np.ascontiguousarray(fields.reshape(height, width, 2, count).transpose(2, 0, 1, 3))
 
 
-@njit(cache=True)
+@compiled
 def _frame(
     edges: NDArray[np.float32], sources: NDArray[np.bool_], lanes: int
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:  # pragma: no cover
@@ -88,7 +89,7 @@ def _frame(
     return costs.reshape(4, height, size), fields.reshape(height, size)
 
 
-@njit(cache=True)
+@compiled
 def _sweep(
     costs: NDArray[np.float32], fields: NDArray[np.float32], lanes: int
 ) -> None:  # pragma: no cover
@@ -128,7 +129,7 @@ def _sweep(
                     down[above] = up[above] = changed = True
 
 
-@njit(cache=True)
+@compiled
 def _relax_next(
     here: NDArray[np.float32],
     there: NDArray[np.float32],
@@ -160,7 +161,7 @@ def _relax_next(
     return changed != 0
 
 
-@njit(cache=True)
+@compiled
 def _relax_previous(
     here: NDArray[np.float32],
     there: NDArray[np.float32],
@@ -186,7 +187,7 @@ def _relax_previous(
     return changed != 0
 
 
-@njit(cache=True)
+@compiled
 def _relax_row(
     row: NDArray[np.float32], costs: NDArray[np.float32], lanes: int
 ) -> None:  # pragma: no cover

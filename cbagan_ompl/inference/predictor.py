@@ -20,13 +20,15 @@ from ..maps.grid_search import prepare_search
 from ..networks.config import MAX_IMAGE_SIZE
 from ..robots.poses import position_map, position_of
 from ..robots.robot import Robot
+from ..sampling.bridges import connect
 from ..sampling.heatmap import Heatmap
 from .bundled_models import find_model
 from .convolutions import use_onednn
+from .graphs import TorchGraphs
 from .model_files import load_script, read_model
+from .pipelines import KeptMaps, make_pipeline
 from .probe import Kind, try_model
-from .scaling import enlarged_values, scaled_map, scaled_shape
-from .torch_runtime import KeptMaps, TorchRuntime
+from .scaling import scaled_map, scaled_shape
 
 if TYPE_CHECKING:
     import torch
@@ -125,7 +127,8 @@ class Predictor:
         self.module = module
         self.record = record
         self.inference_threads = 1
-        self._runtime = TorchRuntime(module)
+        self._graphs = TorchGraphs(module)
+        self._pipeline = make_pipeline(self._graphs)
         self._kept: WeakKeyDictionary[GridMap, KeptMaps] = WeakKeyDictionary()
 
     def warm_up(self) -> None:
@@ -225,12 +228,13 @@ class Predictor:
         tasks = [grid.check_task(*task) for task in zip(starts, goals, strict=True)]
         shape = scaled_shape(grid.shape, int(self.record["working_size"]))
         scale = shape[1] / grid.width, shape[0] / grid.height
-        endpoints = grid.to_pixel(np.array(tasks)) * scale
-        outputs = self._run(self._read_grid(grid, shape), endpoints[:, 0], endpoints[:, 1])
+        pixels = grid.to_pixel(np.array(tasks))
+        maps, endpoints = self._read_grid(grid, shape), pixels * scale
+        outputs = self._run(maps, endpoints[:, 0], endpoints[:, 1])
         heatmaps = [_make_heatmap(values, grid) for values in outputs]
         if not repair:
             return heatmaps
-        return [heatmap.connected(*task) for heatmap, task in zip(heatmaps, tasks, strict=True)]
+        return [connect(heatmap, pair) for heatmap, pair in zip(heatmaps, pixels, strict=True)]
 
     def probabilities(
         self, free: NDArray[np.bool_], start: NDArray[np.floating], goal: NDArray[np.floating]
@@ -258,16 +262,19 @@ class Predictor:
         return kept
 
     def _read_maps(self, free: NDArray[np.bool_]) -> KeptMaps:
-        with _translate_lack_of_memory(free.shape):
-            return self._runtime.read_maps(free)
+        with _translate_lack_of_memory(free.shape), self._graphs.ready():
+            return self._pipeline.read_maps(free)
 
     def _run(
         self, maps: KeptMaps, start: NDArray[np.floating], goal: NDArray[np.floating]
     ) -> NDArray[np.float32]:
         """Return the probabilities for tasks on maps, (B, H, W)."""
-        self._runtime.threads = self.inference_threads
-        with _translate_lack_of_memory((len(start), *maps.shape)):
-            return self._runtime.probabilities(maps, start, goal)[:, 0]
+        self._graphs.threads = self.inference_threads
+        shape = len(start), *maps.shape
+        with _translate_lack_of_memory(shape), self._graphs.ready():
+            return self._pipeline.probabilities(
+                maps, start.astype(np.float32), goal.astype(np.float32)
+            )
 
     def __repr__(self) -> str:
         return (
@@ -294,7 +301,7 @@ def _list_points(name: str, points: Iterable[ArrayLike]) -> list[ArrayLike]:
 
 def _make_heatmap(values: NDArray[np.float32], grid: GridMap) -> Heatmap:
     """Return the heat map of a network's output."""
-    full = enlarged_values(values, grid.shape, _LEAST_VALUE)
-    if not np.logical_and(full > 0, grid.free).any():
-        full[:] = _FLOOR
-    return Heatmap(full, grid)
+    from ..sampling.painting import paint_heatmap  # here, since numba takes long to import
+
+    painted = paint_heatmap(values, grid, _LEAST_VALUE)
+    return painted or Heatmap(np.full(grid.shape, _FLOOR, np.float32), grid)

@@ -1,10 +1,9 @@
-"""Maps at the size that a network works at, and its output at the size of the map."""
+"""Maps at the size that a network works at."""
 
 from __future__ import annotations
 
 from weakref import WeakKeyDictionary
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,9 +12,6 @@ from ..maps.grid_map import GridMap
 # Small maps are enlarged by this factor at most: more shows the network nothing new, and the cost
 # grows with its square.
 _MAX_ENLARGEMENT = 2
-
-# Side of the blocks of an output of which only those with a region are enlarged, in pixels.
-_BLOCK = 16
 
 # Every map with its free mask at the size that it was asked at last: a second task on the same map
 # does not pay for it.
@@ -63,42 +59,3 @@ def scaled_free(free: NDArray[np.bool_], shape: tuple[int, int]) -> NDArray[np.b
         return free
     rows, columns = (np.arange(n) * size // n for n, size in zip(shape, free.shape, strict=True))
     return np.logical_or.reduceat(np.logical_or.reduceat(free, rows, axis=0), columns, axis=1)
-
-
-def enlarged_values(
-    values: NDArray[np.float32], shape: tuple[int, int], least: float
-) -> NDArray[np.float32]:
-    """Return values at the size of a map, by linear interpolation; those that are too small are 0.
-
-    On maps that are a whole number of times as large, only blocks that hold a value that is large
-    enough are interpolated: a region of a few per cent costs a few per cent of the pixels.
-
-    Args:
-        values: (h, w).
-        shape: (H, W).
-        least: values below it become 0.
-    """
-    factor, remainder = divmod(shape[0], values.shape[0])
-    if remainder or factor < 2 or shape[1] != factor * values.shape[1]:
-        return _enlarge(values, shape, least)
-    result = np.zeros(shape, np.float32)
-    # Beyond its border a block needs one more pixel, for the interpolation.
-    padded = np.pad(values, 1, mode="edge")
-    for top in range(0, values.shape[0], _BLOCK):
-        for left in range(0, values.shape[1], _BLOCK):
-            block = padded[top : top + _BLOCK + 2, left : left + _BLOCK + 2]
-            if (block >= least).any():
-                size = factor * block.shape[0], factor * block.shape[1]
-                inside = _enlarge(block, size, least)[factor:-factor, factor:-factor]
-                rows, columns = (slice(factor * n, factor * (n + _BLOCK)) for n in (top, left))
-                result[rows, columns] = inside
-    return result
-
-
-def _enlarge(
-    values: NDArray[np.float32], shape: tuple[int, int], least: float
-) -> NDArray[np.float32]:
-    resized = cv2.resize(values, shape[::-1], interpolation=cv2.INTER_LINEAR)
-    enlarged = np.asarray(resized, np.float32)
-    enlarged[enlarged < least] = 0
-    return enlarged

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import floor
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -22,11 +23,14 @@ Moves = dict[str, dict[str, Any]]
 
 def check_endpoints(grid: GridMap, start: ArrayLike, goal: ArrayLike) -> Endpoints:
     """Return start and goal as arrays; see :meth:`cbagan_ompl.GridMap.check_task`."""
-    endpoints = _check_free(grid, "start", start), _check_free(grid, "goal", goal)
+    (first, pixel), (last, other) = (
+        _check_free(grid, "start", start),
+        _check_free(grid, "goal", goal),
+    )
+    endpoints = first, last
     if np.array_equal(*endpoints):
         raise TaskError(f"start and goal are the same point {_format(endpoints[0])}")
-    (u0, v0), (u1, v1) = grid.to_pixel(endpoints).astype(np.intp)
-    if grid.components[v0, u0] != grid.components[v1, u1]:
+    if grid.components[pixel] != grid.components[other]:
         raise TaskError(
             f"{grid.name}: no path connects start {_format(endpoints[0])} and goal "
             f"{_format(endpoints[1])}, obstacles separate them; choose both in one "
@@ -131,16 +135,18 @@ def _find_places(grid: GridMap, role: str, point: ArrayLike, distance: float) ->
     }
 
 
-def _check_free(grid: GridMap, role: str, point: ArrayLike) -> NDArray[np.float64]:
-    position = check_position(grid, role, point)
-    column, row = np.floor(grid.to_pixel(position)).astype(int).tolist()
+def _check_free(
+    grid: GridMap, role: str, point: ArrayLike
+) -> tuple[NDArray[np.float64], tuple[int, int]]:
+    """Return a point in free space, and the row and column of its pixel."""
+    position, (row, column) = _locate(grid, role, point)
     if not grid.free[row, column]:
         raise TaskError(
             f"{role} {_format(position)} is {_describe_blocked(grid, position)} "
             f"(pixel column {column}, row {row}); choose a free point, or let it be moved to the "
             "nearest one with snap (--snap D)"
         )
-    return position
+    return position, (row, column)
 
 
 def check_point(role: str, point: ArrayLike) -> NDArray[np.float64]:
@@ -173,15 +179,22 @@ def check_position(grid: GridMap, role: str, point: ArrayLike) -> NDArray[np.flo
     Raises:
         TaskError: no point, or one outside of the map.
     """
+    return _locate(grid, role, point)[0]
+
+
+def _locate(
+    grid: GridMap, role: str, point: ArrayLike
+) -> tuple[NDArray[np.float64], tuple[int, int]]:
+    """Return a position as :func:`check_position`, and the row and column of its pixel."""
     position = check_point(role, point)
-    column, row = np.floor(grid.to_pixel(position)).tolist()
+    column, row = map(floor, grid.to_pixel(position).tolist())
     if not (0 <= column < grid.width and 0 <= row < grid.height):
         low, high = grid.bounds
         raise TaskError(
             f"{role} {_format(position)} is outside {grid.name}, which spans "
             f"x {low[0]:g} to {high[0]:g} and y {low[1]:g} to {high[1]:g}"
         )
-    return position
+    return position, (row, column)
 
 
 def _describe_blocked(grid: GridMap, position: NDArray[np.float64]) -> str:

@@ -30,9 +30,10 @@ class Affine(NamedTuple):
     def __call__(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Apply to points, shape (..., 2)."""
         x, y = points[..., 0], points[..., 1]
-        return np.stack(
-            (self.a * x + self.b * y + self.c, self.d * x + self.e * y + self.f), axis=-1
-        )
+        result = np.empty(points.shape)
+        result[..., 0] = self.a * x + self.b * y + self.c
+        result[..., 1] = self.d * x + self.e * y + self.f
+        return result
 
 
 def pixel_from_world(resolution: float, origin: Origin | None, height: int) -> Affine:

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
+from ..maps.connectivity import in_one_component
 from ..maps.grid_map import GridMap
 from ..maps.grid_search import shortest_path
 from .bands import half_width, paint_band
 from .pixels import pixel_pair
+
+if TYPE_CHECKING:
+    from .heatmap import Heatmap
 
 # Half width of a bridge, which is kept narrow, as a fraction of the map's longer side.
 _BRIDGE_FRACTION = 0.015
@@ -18,6 +24,20 @@ _REPAIR_SIZE = 128
 
 # Cost of a pixel length inside the region, relative to one where the heat map is 0.
 _REGION_COST = 0.02
+
+
+def connect(heatmap: Heatmap, endpoints: NDArray[np.float64]) -> Heatmap:
+    """Return a heat map whose region connects two points; itself where it does already.
+
+    Args:
+        heatmap: any heat map.
+        endpoints: start and goal, connected by free pixels, (2, 2), pixels.
+    """
+    region, grid = heatmap.region, heatmap.grid
+    if in_one_component(region, *pixel_pair(endpoints), connectivity=4):
+        return heatmap
+    values = bridge(heatmap.values, region, grid, endpoints)
+    return type(heatmap)(values, grid, heatmap.heading)
 
 
 def bridge(

@@ -19,7 +19,7 @@ from ..maps.grid_search import pull_taut, shortest_path
 from ..robots.poses import position_map, position_of
 from ..robots.robot import Robot
 from .bands import half_width, paint_band
-from .bridges import bridge
+from .bridges import connect
 from .headings import check_headings, descend, look_up, sample_headings
 from .heatmap_files import read_heatmap_values
 from .heatmap_values import to_unit_range
@@ -236,11 +236,7 @@ class Heatmap:
             >>> heatmap.connected((0.5, 0.5), (2.5, 0.5)).region.tolist()
             [[True, True, True]]
         """
-        endpoints = self.grid.to_pixel(self.grid.check_task(start, goal))
-        if self.connects(start, goal):
-            return self
-        values = bridge(self.values, self.region, self.grid, endpoints)
-        return Heatmap(values, self.grid, self.heading)
+        return connect(self, self.grid.to_pixel(self.grid.check_task(start, goal)))
 
     def with_heading(self, heading: ArrayLike | None) -> Heatmap:
         """Return this heat map with other headings.

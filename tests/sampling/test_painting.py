@@ -1,0 +1,36 @@
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from cbagan_ompl import GridMap, Heatmap
+from cbagan_ompl.sampling.painting import paint_heatmap
+
+SHAPES = [(40, 33), (80, 66), (160, 132), (97, 71), (41, 66), (20, 16), (20, 70)]
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("kind", ["everywhere", "sparse"])
+def test_painted_values_are_those_of_a_resized_image(shape: tuple[int, int], kind: str) -> None:
+    rng = np.random.default_rng(0)
+    values = rng.random((40, 33), dtype=np.float32)
+    if kind == "sparse":
+        values[:] = 0
+        values[17:22, 12:20] = rng.random((5, 8))
+        values[0, 0] = values[-1, -1] = values[-1, 0] = 1
+    grid = GridMap(rng.random(shape) < 0.8)
+    whole = values if shape == values.shape else cv2.resize(values, shape[::-1])
+    expected = Heatmap(np.where(whole < 0.25, 0, whole), grid)
+    heatmap = paint_heatmap(values, grid, 0.25)
+    assert heatmap is not None
+    np.testing.assert_allclose(heatmap.values, expected.values, rtol=0, atol=1e-6)
+    assert np.array_equal(heatmap.support, expected.support)
+    assert not heatmap.values.flags.writeable
+    assert heatmap.heading is None
+    assert np.array_equal(heatmap.sample(50, rng=1), expected.sample(50, rng=1))
+
+
+def test_nothing_is_painted_on_obstacles_or_below_the_least_value() -> None:
+    grid = GridMap([[1, 0], [1, 1]])
+    assert paint_heatmap(np.array([[0.2, 0.9], [0.2, 0.2]], np.float32), grid, 0.25) is None
