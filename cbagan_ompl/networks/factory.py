@@ -9,11 +9,9 @@ from .attention import Attention
 from .config import MAX_WEIGHTS, NetworkConfig
 from .discriminator import Discriminator
 from .generator import Generator
+from .export_model import AnyGenerator
 from .passage_generator import PassageGenerator
 from .patch_generator import PatchGenerator
-
-#: The generators.
-AnyGenerator = Generator | PatchGenerator | PassageGenerator
 
 
 def check_weights(config: NetworkConfig) -> None:

@@ -1,4 +1,4 @@
-"""The distances of :mod:`.passages`, compiled, with their gradients. Needs numba.
+"""The distances of :mod:`.passages`, compiled.
 
 The nodes are visited in about the order of their distance, as in fast marching: J. A. Sethian, "A
 fast marching level set method for monotonically advancing fronts", PNAS 93(4), 1996,
@@ -8,62 +8,19 @@ visited again, so that the result does not depend on the width of the buckets.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-import torch
-from numba import njit
 from numpy.typing import NDArray
-from torch import Tensor
 
-_UNREACHED = np.float32(1e4)
+from ..common.compilation import compiled
+
+#: Distances are found up to this factor of the one between the endpoints, and this much more.
+REACH, REACH_SLACK = 1.5, 4.0
+
+#: Distance of the nodes that no path reaches.
+UNREACHED = np.float32(1e4)
+
 _BUCKETS = 128
 _BUCKET_WIDTH = 0.25
-
-
-class FastMarching(torch.autograd.Function):
-    """Distances of all nodes from start and goal, with gradients by the costs, and directions.
-
-    Takes the same as :func:`.passages.distance_fields`, and returns its distances, as far as they
-    are of use (up to ``reach`` times the distance between the endpoints, and 4 more), and what
-    :func:`.passages.directions` returns for them.
-    """
-
-    @staticmethod
-    def forward(  # type: ignore[override]
-        ctx: Any, costs: Tensor, codes: Tensor, start: Tensor, goal: Tensor, reach: float
-    ) -> tuple[Tensor, Tensor]:
-        """Return the distances and the directions."""
-        cost_values = costs.detach().float().contiguous().numpy()
-        linked = link_bits(codes.numpy())
-        distances = march_all(cost_values, linked, start.numpy(), goal.numpy(), reach)
-        ctx.values = cost_values, linked, distances
-        towards = torch.from_numpy(descent_directions(distances, linked))
-        ctx.mark_non_differentiable(towards)
-        return torch.from_numpy(distances), towards
-
-    @staticmethod
-    def backward(ctx: Any, gradient: Tensor, _: Tensor) -> tuple[Tensor | None, ...]:  # type: ignore[override]
-        """Return the gradient by the costs."""
-        cost_values, linked, distances = ctx.values
-        result = np.zeros_like(cost_values)
-        flat = gradient.contiguous().numpy()
-        height, width = cost_values.shape[2:]
-        for task in range(len(cost_values)):
-            for field in range(2):
-                values = distances[task, field].ravel()
-                order = np.argsort(values)[::-1]
-                _descend(
-                    cost_values[task].ravel(),
-                    linked[task].ravel(),
-                    values,
-                    order,
-                    flat[task, field].ravel().copy(),
-                    result[task].ravel(),
-                    height,
-                    width,
-                )
-        return torch.from_numpy(result), None, None, None, None
 
 
 def march_all(
@@ -71,7 +28,6 @@ def march_all(
     linked: NDArray[np.uint16],
     start: NDArray[np.int64],
     goal: NDArray[np.int64],
-    reach: float,
 ) -> NDArray[np.float32]:
     """Return the distances of several tasks.
 
@@ -80,13 +36,11 @@ def march_all(
         linked: (B, 3, h, w), see :func:`link_bits`.
         start: (B,), see :func:`.passages.endpoint_nodes`.
         goal: (B,), the same.
-        reach: see :class:`FastMarching`.
-
     Returns:
         (B, 2, 3, h, w).
     """
     batch, nodes, height, width = costs.shape
-    distances = np.full((batch, 2, nodes, height, width), _UNREACHED, np.float32)
+    distances = np.full((batch, 2, nodes, height, width), UNREACHED, np.float32)
     for task in range(batch):
         for field in range(2):
             source, target = (start, goal) if field == 0 else (goal, start)
@@ -95,14 +49,13 @@ def march_all(
                 linked[task].ravel(),
                 int(source[task]),
                 int(target[task]),
-                np.float32(reach),
                 distances[task, field].ravel(),
                 width,
             )
     return distances
 
 
-@njit(cache=True)
+@compiled
 def link_bits(codes: NDArray[np.int32]) -> NDArray[np.uint16]:  # pragma: no cover
     """Return the links of each node as bits.
 
@@ -136,7 +89,7 @@ def link_bits(codes: NDArray[np.int32]) -> NDArray[np.uint16]:  # pragma: no cov
     return linked
 
 
-@njit(cache=True)
+@compiled
 def descent_directions(
     distances: NDArray[np.float32], linked: NDArray[np.uint16]
 ) -> NDArray[np.float32]:  # pragma: no cover
@@ -159,9 +112,9 @@ def descent_directions(
                 for row in range(height):
                     for column in range(width):
                         value, bits = values[node, row, column], linked[task, node, row, column]
-                        if bits == 0 or value >= _UNREACHED:
+                        if bits == 0 or value >= UNREACHED:
                             continue
-                        near[:] = _UNREACHED
+                        near[:] = UNREACHED
                         for direction in range(4):
                             y = row + (direction == 3) - (direction == 2)
                             x = column + (direction == 1) - (direction == 0)
@@ -182,7 +135,7 @@ def descent_directions(
     return result
 
 
-@njit(cache=True)
+@compiled
 def _pair_min(
     values: NDArray[np.float32], bits: int, cells: int, first: int, second: int
 ) -> np.float32:  # pragma: no cover
@@ -195,7 +148,7 @@ def _pair_min(
         first: index of the first patch.
         second: index of the second one.
     """
-    best = _UNREACHED
+    best = UNREACHED
     for part in range(3):
         if (bits >> part) & 1:
             best = min(best, values[part * cells + first])
@@ -204,13 +157,12 @@ def _pair_min(
     return best
 
 
-@njit(cache=True)
+@compiled
 def _march(
     costs: NDArray[np.float32],
     linked: NDArray[np.uint16],
     source: int,
     target: int,
-    reach: np.float32,
     values: NDArray[np.float32],
     width: int,
 ) -> None:  # pragma: no cover
@@ -240,7 +192,7 @@ def _march(
         queued[node] = -1
         value = values[node]
         if node == target:
-            limit = reach * value + 4
+            limit = np.float32(REACH * value + REACH_SLACK)
         cell = node % cells
         bits = linked[node]
         for direction in range(4):
@@ -288,58 +240,3 @@ def _march(
                 following[entry] = heads[bucket % _BUCKETS]
                 heads[bucket % _BUCKETS] = entry
                 waiting += 1
-
-
-@njit(cache=True)
-def _descend(
-    costs: NDArray[np.float32],
-    linked: NDArray[np.uint16],
-    values: NDArray[np.float32],
-    order: NDArray[np.int64],
-    gradient: NDArray[np.float32],
-    result: NDArray[np.float32],
-    height: int,
-    width: int,
-) -> None:  # pragma: no cover
-    """Add the gradient by the costs, from the farthest node to the nearest.
-
-    Args:
-        costs: of all nodes.
-        linked: see :func:`link_bits`.
-        values: the distances.
-        order: of the nodes, farthest first.
-        gradient: by the distances; changed.
-        result: gradient by the costs, added in place.
-        height: of the map, in patches.
-        width: of the map, in patches.
-    """
-    cells = height * width
-    steps = np.array((-1, 1, -width, width))
-    parents = np.empty(2, np.int64)
-    for node in order:
-        if gradient[node] == 0 or values[node] >= _UNREACHED or values[node] == 0:
-            continue
-        bits, cell = linked[node], node % cells
-        parents[:] = -1
-        for direction in range(4):
-            for part in range(3):
-                if (bits >> (3 * direction + part)) & 1:
-                    other = cell + steps[direction] + part * cells
-                    axis = direction // 2
-                    if parents[axis] < 0 or values[other] < values[parents[axis]]:
-                        parents[axis] = other
-        cost, slope = costs[node], gradient[node]
-        if parents[0] >= 0 and parents[1] >= 0:
-            across, along = values[parents[0]], values[parents[1]]
-            if abs(across - along) < cost:
-                u, v = values[node] - across, values[node] - along
-                total = u + v
-                gradient[parents[0]] += slope * u / total
-                gradient[parents[1]] += slope * v / total
-                result[node] += slope * cost / total
-                continue
-            nearer = 0 if across < along else 1
-        else:
-            nearer = 0 if parents[0] >= 0 else 1
-        gradient[parents[nearer]] += slope
-        result[node] += slope

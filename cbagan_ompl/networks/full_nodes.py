@@ -1,4 +1,4 @@
-"""The nodes of :mod:`.passages` for maps that are scaled down, from all of their pixels. Needs numba.
+"""The nodes of :mod:`.passages` for maps that are scaled down, from all of their pixels.
 
 On a map that is scaled down, thin walls and narrow passages are lost. So the components of a patch
 are found among the pixels of the full map that it covers, and linked there. A pixel of the scaled
@@ -8,8 +8,9 @@ map belongs to a node when any of its pixels does, so that it may belong to seve
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ..common.compilation import compiled
 
 
 def full_nodes(
@@ -79,7 +80,7 @@ def full_node_of(
     return (node * codes.shape[1] + row) * codes.shape[2] + column
 
 
-@njit(cache=True)
+@compiled
 def _label(
     free: NDArray[np.bool_],
     row_edges: NDArray[np.int64],
@@ -131,7 +132,7 @@ def _label(
                                 codes[nodes[y, x] - 1, i // 4, j // 4] |= bit
 
 
-@njit(cache=True)
+@compiled
 def _rank(
     block: NDArray[np.bool_],
     labels: NDArray[np.int32],
@@ -181,7 +182,7 @@ def _rank(
                     rank[label] = 3
 
 
-@njit(cache=True)
+@compiled
 def _link(
     nodes: NDArray[np.uint8],
     row_edges: NDArray[np.int64],

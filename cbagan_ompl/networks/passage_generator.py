@@ -14,7 +14,6 @@ from .encoding import free_space, region_image, spot_centres
 from .passages import (
     NODES,
     PATCH,
-    REACH,
     component_table,
     directions,
     distance_fields,
@@ -202,9 +201,7 @@ class PassageGenerator(nn.Module):
         # What the other nodes of a patch are worse.
         worse = (logits - own) * (codes > 0)
         if bool((worse < 0).any()):
-            bits = torch.arange(16, dtype=torch.int32, device=codes.device)
-            members = ((codes.unsqueeze(4) >> bits) & 1).float()
-            tiles = tiles + (members * worse.unsqueeze(4)).sum(1)
+            tiles = tiles + self._worse_pixels(worse, codes)
         batch, height, width = tiles.size(0), tiles.size(1), tiles.size(2)
         tiles = torch.sigmoid(tiles).view(batch, height, width, 4, 4).transpose(2, 3)
         region = tiles.reshape(free.size())
@@ -212,14 +209,29 @@ class PassageGenerator(nn.Module):
         vectors = unit_vectors(vectors) * (distances[:, 1].gather(1, node) < 1e4)
         return (region * free if self.white_obstacles else region), vectors
 
+    def _worse_pixels(self, worse: Tensor, codes: Tensor) -> Tensor:
+        """Return by how much the logit of each pixel is below that of the best node of its patch.
+
+        Args:
+            worse: (B, 3, h, w), of the nodes, above -20.
+            codes: (B, 3, h, w).
+
+        Returns:
+            (B, h, w, 16); that of the best node where a pixel belongs to several, 0 for none.
+        """
+        bits = torch.arange(16, dtype=torch.int32, device=codes.device)
+        members = ((codes.unsqueeze(4) >> bits) & 1).float()
+        best = (members * (worse + 20.0).unsqueeze(4)).amax(1)
+        return torch.where(best > 0, best - 20.0, best)
+
 
 @torch.jit.unused
 def _march(costs: Tensor, codes: Tensor, start: Tensor, goal: Tensor) -> tuple[Tensor, Tensor]:
     """Return the distances with gradients, and the directions."""
-    # Here, since numba is optional and compiles on first use.
-    from .fast_marching import FastMarching
+    # Here, since numba takes long to import.
+    from .marching_gradients import FastMarching
 
-    result: tuple[Tensor, Tensor] = FastMarching.apply(costs, codes, start, goal, REACH)
+    result: tuple[Tensor, Tensor] = FastMarching.apply(costs, codes, start, goal)
     return result
 
 

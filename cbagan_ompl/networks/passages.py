@@ -24,10 +24,6 @@ NODES = 3
 #: Distance of the nodes that no path reaches.
 UNREACHED = 1e4
 
-#: Nodes farther from an endpoint than the other endpoint is are of use up to this factor, and this
-#: number of patches more.
-REACH, REACH_SLACK = 1.5, 4.0
-
 # The bits of the columns on the left and on the right, and of the rows at the top and the bottom.
 _LEFT, _RIGHT, _TOP, _BOTTOM = 0x1111, 0x8888, 0x000F, 0xF000
 
