@@ -30,10 +30,10 @@ _LEFT, _RIGHT, _TOP, _BOTTOM = 0x1111, 0x8888, 0x000F, 0xF000
 
 @cache
 def component_table() -> Tensor:
-    """Return the codes of the three nodes of each code, (65536, 3) int32.
+    """Return the codes of the three nodes of each code, (65536, 3) int16, the lowest 16 bits.
 
     Example:
-        >>> component_table()[0b0000_1111_0000_1011].tolist()
+        >>> (component_table()[0b0000_1111_0000_1011].int() & 0xFFFF).tolist()
         [3840, 3, 8]
     """
     codes = torch.arange(2**16, dtype=torch.int32, device="cpu")
@@ -48,7 +48,8 @@ def component_table() -> Tensor:
     order = torch.stack(keys).sort(dim=0, descending=True, stable=True)
     ranked = torch.stack(components).gather(0, order.indices)
     others = torch.where(order.values[2:] > 32, ranked[2:], 0).sum(0, dtype=torch.int32)
-    return torch.stack((ranked[0], ranked[1], torch.where(others > 0, others, ranked[2])), 1)
+    third = torch.where(others > 0, others, ranked[2])
+    return torch.stack((ranked[0], ranked[1], third), 1).to(torch.int16)
 
 
 def _grow(component: Tensor, codes: Tensor) -> Tensor:
@@ -81,7 +82,8 @@ def patch_codes(free: Tensor, table: Tensor) -> Tensor:
     rows = ((free > 0.5).view(batch, 4 * height, width, 4) * powers).sum(3)
     rows = rows.view(batch, height, 4, width)
     codes = rows[:, :, 0] + 16 * rows[:, :, 1] + 256 * rows[:, :, 2] + 4096 * rows[:, :, 3]
-    return table[codes.long()].permute(0, 3, 1, 2).contiguous()
+    nodes = table[codes.long()].int() & 0xFFFF
+    return nodes.permute(0, 3, 1, 2).contiguous()
 
 
 def endpoint_nodes(points: Tensor, codes: Tensor) -> Tensor:
