@@ -136,7 +136,7 @@ class PassageModel(nn.Module):
             free: (B, 1, H, W) in [0, 1], 1 where free, of any size.
 
         Returns:
-            (B, stem, h, w) and (B, 3, h, w), see :meth:`PassageGenerator.encode`; of h x w patches,
+            (B, stem, h, w) and (B, 4, h, w), see :meth:`PassageGenerator.encode`; of h x w patches,
             to which the map is padded.
         """
         tiles = tiles_of(pad_to_stride(free, self.stride), 4)
@@ -157,9 +157,9 @@ class PassageModel(nn.Module):
 
         Args:
             kept: from :meth:`read_map`.
-            codes: (B, 3, h, w) int32, see :func:`.passages.patch_codes`.
-            distances: (B, 2, 3, h, w), see :func:`.passages.distance_fields`.
-            towards: (B, 2, 2, 3, h, w), see :func:`.passages.directions`.
+            codes: (B, 4, h, w) int32, see :func:`.passages.patch_codes`.
+            distances: (B, 2, 4, h, w), see :func:`.passages.distance_fields`.
+            towards: (B, 2, 2, 4, h, w), see :func:`.passages.directions`.
             free: (B, 1, 4 h, 4 w), 1 where free: the map with its padding.
 
         Returns:

@@ -32,12 +32,12 @@ def march_all(
     """Return the distances of several tasks.
 
     Args:
-        costs: (B, 3, h, w), see :func:`.passages.distance_fields`; contiguous.
-        linked: (B, 3, h, w), see :func:`link_bits`.
+        costs: (B, 4, h, w), see :func:`.passages.distance_fields`; contiguous.
+        linked: (B, 4, h, w), see :func:`link_bits`.
         start: (B,), see :func:`.passages.endpoint_nodes`.
         goal: (B,), the same.
     Returns:
-        (B, 2, 3, h, w).
+        (B, 2, 4, h, w).
     """
     batch, nodes, height, width = costs.shape
     distances = np.full((batch, 2, nodes, height, width), UNREACHED, np.float32)
@@ -60,10 +60,10 @@ def link_bits(codes: NDArray[np.int32]) -> NDArray[np.uint16]:  # pragma: no cov
     """Return the links of each node as bits.
 
     Args:
-        codes: (B, 3, h, w), see :func:`.passages.patch_codes`.
+        codes: (B, 4, h, w), see :func:`.passages.patch_codes`.
 
     Returns:
-        (B, 3, h, w): bit 3 * direction + node is 1 where this node of the neighbouring patch is
+        (B, 4, h, w): bit 4 * direction + node is 1 where this node of the neighbouring patch is
         linked; directions are left, right, above, below.
     """
     batch, nodes, height, width = codes.shape
@@ -79,13 +79,13 @@ def link_bits(codes: NDArray[np.int32]) -> NDArray[np.uint16]:  # pragma: no cov
                         if column + 1 < width:
                             other = codes[task, there, row, column + 1]
                             if ((code & 0x8888) >> 3) & other:
-                                linked[task, here, row, column] |= 1 << (3 + there)
+                                linked[task, here, row, column] |= 1 << (4 + there)
                                 linked[task, there, row, column + 1] |= 1 << here
                         if row + 1 < height:
                             other = codes[task, there, row + 1, column]
                             if ((code & 0xF000) >> 12) & other:
-                                linked[task, here, row, column] |= 1 << (9 + there)
-                                linked[task, there, row + 1, column] |= 1 << (6 + here)
+                                linked[task, here, row, column] |= 1 << (12 + there)
+                                linked[task, there, row + 1, column] |= 1 << (8 + here)
     return linked
 
 
@@ -96,11 +96,11 @@ def descent_directions(
     """Return the directions of steepest descent, see :func:`.passages.directions`.
 
     Args:
-        distances: (B, 2, 3, h, w), see :func:`march_all`.
-        linked: (B, 3, h, w), see :func:`link_bits`.
+        distances: (B, 2, 4, h, w), see :func:`march_all`.
+        linked: (B, 4, h, w), see :func:`link_bits`.
 
     Returns:
-        (B, 2, 2, 3, h, w): unit vectors (u, v), v down; 0 where nothing is known.
+        (B, 2, 2, 4, h, w): unit vectors (u, v), v down; 0 where nothing is known.
     """
     batch, fields, nodes, height, width = distances.shape
     result = np.zeros((batch, fields, 2, nodes, height, width), np.float32)
@@ -119,7 +119,7 @@ def descent_directions(
                             y = row + (direction == 3) - (direction == 2)
                             x = column + (direction == 1) - (direction == 0)
                             for part in range(nodes):
-                                if (bits >> (3 * direction + part)) & 1:
+                                if (bits >> (4 * direction + part)) & 1:
                                     near[direction] = min(near[direction], values[part, y, x])
                         u = max(value - min(near[0], near[1]), np.float32(0))
                         v = max(value - min(near[2], near[3]), np.float32(0))
@@ -143,16 +143,16 @@ def _pair_min(
 
     Args:
         values: of all nodes.
-        bits: of the links, those of the two patches in the six lowest.
+        bits: of the links, those of the two patches in the eight lowest.
         cells: number of patches.
         first: index of the first patch.
         second: index of the second one.
     """
     best = UNREACHED
-    for part in range(3):
+    for part in range(4):
         if (bits >> part) & 1:
             best = min(best, values[part * cells + first])
-        if (bits >> (3 + part)) & 1:
+        if (bits >> (4 + part)) & 1:
             best = min(best, values[part * cells + second])
     return best
 
@@ -167,7 +167,7 @@ def _march(
     width: int,
 ) -> None:  # pragma: no cover
     """Find the distances from a node, in place."""
-    cells = len(costs) // 3
+    cells = len(costs) // 4
     capacity = 1024
     nodes = np.empty(capacity, np.int32)
     following = np.empty(capacity, np.int32)
@@ -196,11 +196,11 @@ def _march(
         cell = node % cells
         bits = linked[node]
         for direction in range(4):
-            there = (bits >> (3 * direction)) & 7
+            there = (bits >> (4 * direction)) & 15
             if there == 0:
                 continue
             other = cell + steps[direction]
-            for part in range(3):
+            for part in range(4):
                 if not (there >> part) & 1:
                     continue
                 neighbour = other + part * cells
@@ -209,7 +209,7 @@ def _march(
                     continue
                 if direction < 2:
                     side = _pair_min(
-                        values, linked[neighbour] >> 6, cells, other - width, other + width
+                        values, linked[neighbour] >> 8, cells, other - width, other + width
                     )
                 else:
                     side = _pair_min(values, linked[neighbour], cells, other - 1, other + 1)

@@ -25,21 +25,21 @@ def full_nodes(
             blocked.
 
     Returns:
-        Codes (3, rows, columns), as of :func:`.passages.patch_codes`, and the links of the same
+        Codes (4, rows, columns), as of :func:`.passages.patch_codes`, and the links of the same
         shape, as of :func:`.fast_marching.link_bits`.
 
     Example:
         >>> codes, linked = full_nodes(np.ones((16, 16), np.bool_), (8, 8), (2, 2))
         >>> codes[:, 0, 0].tolist(), linked[0].tolist()
-        ([65535, 0, 0], [[520, 513], [72, 65]])
+        ([65535, 0, 0, 0], [[4112, 4097], [272, 257]])
     """
     edges = [
         np.append(np.arange(n) * size // n, size)
         for n, size in zip(shape, free.shape, strict=True)
     ]
     nodes = np.zeros(free.shape, np.uint8)
-    codes = np.zeros((3, *patches), np.int32)
-    linked = np.zeros((3, *patches), np.uint16)
+    codes = np.zeros((4, *patches), np.int32)
+    linked = np.zeros((4, *patches), np.uint16)
     _label(free, edges[0], edges[1], nodes, codes)
     _link(nodes, edges[0][::4], edges[1][::4], linked)
     return codes, linked
@@ -72,7 +72,7 @@ def full_node_of(
     left, right = columns[4 * column], columns[min(4 * column + 4, shape[1])]
     block = free[top:bottom, left:right]
     nodes = np.zeros(block.shape, np.uint8)
-    own = np.zeros((3, 1, 1), np.int32)
+    own = np.zeros((4, 1, 1), np.int32)
     heights = rows[4 * row : 4 * row + 5] - top
     widths = columns[4 * column : 4 * column + 5] - left
     _label(np.ascontiguousarray(block), heights, widths, nodes, own)
@@ -168,7 +168,7 @@ def _rank(
                         waiting += 1
         keys[count] = size + (through if contacts > 1 else 0)
         rank[count] = 0
-    for node in range(1, 4):
+    for node in range(1, 5):
         best = 0
         for label in range(1, count + 1):
             if rank[label] == 0 and (best == 0 or keys[label] > keys[best]):
@@ -176,10 +176,10 @@ def _rank(
         if best == 0:
             return
         rank[best] = node
-        if node == 3 and keys[best] > through:
+        if node == 4 and keys[best] > through:
             for label in range(1, count + 1):
                 if rank[label] == 0 and keys[label] > through:
-                    rank[label] = 3
+                    rank[label] = 4
 
 
 @compiled
@@ -208,11 +208,11 @@ def _link(
                 for y in range(top, bottom):
                     a, b = nodes[y, right - 1], nodes[y, right]
                     if a and b:
-                        linked[a - 1, row, column] |= 1 << (2 + b)
+                        linked[a - 1, row, column] |= 1 << (3 + b)
                         linked[b - 1, row, column + 1] |= 1 << (a - 1)
             if bottom < height:
                 for x in range(left, right):
                     a, b = nodes[bottom - 1, x], nodes[bottom, x]
                     if a and b:
-                        linked[a - 1, row, column] |= 1 << (8 + b)
-                        linked[b - 1, row + 1, column] |= 1 << (5 + a)
+                        linked[a - 1, row, column] |= 1 << (11 + b)
+                        linked[b - 1, row + 1, column] |= 1 << (7 + a)

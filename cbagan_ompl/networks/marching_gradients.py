@@ -90,8 +90,8 @@ def _descend(
         bits, cell = linked[node], node % cells
         parents[:] = -1
         for direction in range(4):
-            for part in range(3):
-                if (bits >> (3 * direction + part)) & 1:
+            for part in range(4):
+                if (bits >> (4 * direction + part)) & 1:
                     other = cell + steps[direction] + part * cells
                     axis = direction // 2
                     if parents[axis] < 0 or values[other] < values[parents[axis]]:

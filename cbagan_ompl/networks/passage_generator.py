@@ -123,7 +123,7 @@ class PassageGenerator(nn.Module):
             noise_features: (B, width, h / 2, w / 2), from the noise stem; or with sizes of 1.
 
         Returns:
-            (B, stem, h, w), and (B, 3, h, w) float32, positive.
+            (B, stem, h, w), and (B, 4, h, w) float32, positive.
         """
         half = torch.relu(self.norm(self.merge(map_features) + noise_features))
         patches = functional.pixel_shuffle(self.split(self.trunk(half)), 2)
@@ -136,7 +136,7 @@ class PassageGenerator(nn.Module):
     ) -> tuple[Tensor, Tensor]:
         """Return the distances of all nodes, and the directions in which they fall.
 
-        See :mod:`.passages`: (B, 2, 3, h, w) and (B, 2, 2, 3, h, w), from start and goal.
+        See :mod:`.passages`: (B, 2, 4, h, w) and (B, 2, 2, 4, h, w), from start and goal.
         """
         if not torch.jit.is_scripting():
             return _march(costs, codes, start, goal)
@@ -213,8 +213,8 @@ class PassageGenerator(nn.Module):
         """Return by how much the logit of each pixel is below that of the best node of its patch.
 
         Args:
-            worse: (B, 3, h, w), of the nodes, above -20.
-            codes: (B, 3, h, w).
+            worse: (B, 4, h, w), of the nodes, above -20.
+            codes: (B, 4, h, w).
 
         Returns:
             (B, h, w, 16); that of the best node where a pixel belongs to several, 0 for none.

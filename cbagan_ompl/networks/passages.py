@@ -2,10 +2,10 @@
 
 A patch of 4 x 4 pixels is a 16-bit number, its code: bit 4 * row + column is 1 where free. Its free
 pixels fall into 4-connected components, and those that touch the border of the patch in more than
-one place can be passed through. A patch has three nodes: the two largest of these, and all others
-together (or, if there are none, a component that is a dead end). Two nodes of neighbouring patches
+one place can be passed through. A patch has four nodes: the three largest of these, and all
+others together (or, if there are fewer, components that are dead ends). Two nodes of neighbouring patches
 are linked where free pixels of both touch across the common side. So paths in the graph are paths
-on the map, and the other way round, but for patches that can be passed in four ways at once.
+on the map, and the other way round, but for patches that can be passed in five ways at once.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from torch import Tensor
 PATCH = 4
 
 #: Nodes of a patch.
-NODES = 3
+NODES = 4
 
 #: Distance of the nodes that no path reaches.
 UNREACHED = 1e4
@@ -30,11 +30,11 @@ _LEFT, _RIGHT, _TOP, _BOTTOM = 0x1111, 0x8888, 0x000F, 0xF000
 
 @cache
 def component_table() -> Tensor:
-    """Return the codes of the three nodes of each code, (65536, 3) int16, the lowest 16 bits.
+    """Return the codes of the four nodes of each code, (65536, 4) int16, the lowest 16 bits.
 
     Example:
         >>> (component_table()[0b0000_1111_0000_1011].int() & 0xFFFF).tolist()
-        [3840, 3, 8]
+        [3840, 3, 8, 0]
     """
     codes = torch.arange(2**16, dtype=torch.int32, device="cpu")
     components, keys = [], []
@@ -47,9 +47,9 @@ def component_table() -> Tensor:
         rest &= ~component
     order = torch.stack(keys).sort(dim=0, descending=True, stable=True)
     ranked = torch.stack(components).gather(0, order.indices)
-    others = torch.where(order.values[2:] > 32, ranked[2:], 0).sum(0, dtype=torch.int32)
-    third = torch.where(others > 0, others, ranked[2])
-    return torch.stack((ranked[0], ranked[1], third), 1).to(torch.int16)
+    others = torch.where(order.values[3:] > 32, ranked[3:], 0).sum(0, dtype=torch.int32)
+    last = torch.where(others > 0, others, ranked[3])
+    return torch.cat((ranked[:3], last[None])).T.to(torch.int16).contiguous()
 
 
 def _grow(component: Tensor, codes: Tensor) -> Tensor:
@@ -68,14 +68,14 @@ def _count_bits(codes: Tensor) -> Tensor:
 
 
 def patch_codes(free: Tensor, table: Tensor) -> Tensor:
-    """Return the three nodes of each patch.
+    """Return the four nodes of each patch.
 
     Args:
         free: (B, 1, H, W) in [0, 1], 1 where free; H and W multiples of :data:`PATCH`.
         table: from :func:`component_table`.
 
     Returns:
-        (B, 3, H / 4, W / 4) int32: the free pixels of each node as a code.
+        (B, 4, H / 4, W / 4) int32: the free pixels of each node as a code.
     """
     batch, height, width = free.size(0), free.size(2) // 4, free.size(3) // 4
     powers = torch.tensor([1.0, 2.0, 4.0, 8.0], device=free.device)
@@ -91,7 +91,7 @@ def endpoint_nodes(points: Tensor, codes: Tensor) -> Tensor:
 
     Args:
         points: (B, 2), pixel coordinates (u, v), u right and v down.
-        codes: (B, 3, h, w), see :func:`patch_codes`.
+        codes: (B, 4, h, w), see :func:`patch_codes`.
 
     Returns:
         (B,) int64, indices into the last three axes of the codes, flattened. On a blocked pixel it
@@ -111,10 +111,10 @@ def links(codes: Tensor) -> Tensor:
     """Return which nodes are linked with the ones to their left and right, above and below.
 
     Args:
-        codes: (B, 3, h, w), see :func:`patch_codes`.
+        codes: (B, 4, h, w), see :func:`patch_codes`.
 
     Returns:
-        (4, B, 3, 3, h, w) bool: by direction (left, right, above, below), node, and node of the
+        (4, B, 4, 4, h, w) bool: by direction (left, right, above, below), node, and node of the
         neighbouring patch.
     """
     batch, nodes, height, width = codes.shape
@@ -135,11 +135,11 @@ def nearest_neighbours(distance: Tensor, linked: Tensor) -> Tensor:
     """Return the smaller distance of the linked nodes in each direction.
 
     Args:
-        distance: (..., B, 3, h, w).
+        distance: (..., B, 4, h, w).
         linked: see :func:`links`.
 
     Returns:
-        (4, ..., B, 3, h, w), :data:`UNREACHED` where no node is linked.
+        (4, ..., B, 4, h, w), :data:`UNREACHED` where no node is linked.
     """
     framed = torch.nn.functional.pad(distance, [1, 1, 1, 1], value=1e4)
     shifted = torch.stack(
@@ -164,14 +164,14 @@ def distance_fields(
     :mod:`.fast_marching` does the same, compiled.
 
     Args:
-        costs: (B, 3, h, w) float32, positive: of each node, for a way as long as a patch.
-        codes: (B, 3, h, w), see :func:`patch_codes`.
+        costs: (B, 4, h, w) float32, positive: of each node, for a way as long as a patch.
+        codes: (B, 4, h, w), see :func:`patch_codes`.
         start: (B,), see :func:`endpoint_nodes`.
         goal: (B,), the same.
         rounds: limit of their number.
 
     Returns:
-        (B, 2, 3, h, w): by endpoint and node; 1e4 where no path leads.
+        (B, 2, 4, h, w): by endpoint and node; 1e4 where no path leads.
     """
     with torch.no_grad():
         sources = torch.stack((start, goal))
@@ -198,11 +198,11 @@ def directions(distance: Tensor, codes: Tensor) -> Tensor:
     """Return the directions of steepest descent.
 
     Args:
-        distance: (B, 2, 3, h, w), see :func:`distance_fields`.
-        codes: (B, 3, h, w), see :func:`patch_codes`.
+        distance: (B, 2, 4, h, w), see :func:`distance_fields`.
+        codes: (B, 4, h, w), see :func:`patch_codes`.
 
     Returns:
-        (B, 2, 2, 3, h, w): unit vectors (u, v), v down, by endpoint, coordinate and node; 0 where
+        (B, 2, 2, 4, h, w): unit vectors (u, v), v down, by endpoint, coordinate and node; 0 where
         no node beside it is nearer.
     """
     fields = distance.transpose(0, 1)

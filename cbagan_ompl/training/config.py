@@ -278,7 +278,7 @@ PRESETS: dict[str, TrainingConfig] = {
     "best": TrainingConfig(),
     "synthetic": TrainingConfig(
         network=_BUNDLED,
-        epochs=16,
+        epochs=14,
         batch_size=16,
         warmup=0.05,
         clip_norm=2.0,
