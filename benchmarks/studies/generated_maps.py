@@ -31,9 +31,9 @@ from cbagan_ompl.datasets.geodesic_labels import DIRECTION_PATCH
 from cbagan_ompl.datasets.synthetic import SyntheticSettings, generate_map_tasks
 from cbagan_ompl.maps.connectivity import connects
 from cbagan_ompl.networks.config import NetworkConfig
-from cbagan_ompl.networks.export_model import PassageModel
-from cbagan_ompl.networks.passage_generator import PassageGenerator
 from cbagan_ompl.networks.factory import make_generator
+from cbagan_ompl.networks.passage_generator import PassageGenerator
+from cbagan_ompl.networks.passage_model import PassageModel
 
 # Kinds of maps: their generators, and the sizes of the maps.
 SIZES = (128, 256, 512)
@@ -94,7 +94,9 @@ def main() -> None:
     for rows in result["models"].values():
         rows["all"] = {key: mean_of(rows.values(), key) for key in ("connected", "area", "iou")}
     result["angles"] = {
-        name: quantiles(np.concatenate(parts)) for name, parts in errors.items() if any(map(len, parts))
+        name: quantiles(np.concatenate(parts))
+        for name, parts in errors.items()
+        if any(map(len, parts))
     }
     print_result(result)
     if args.json is not None:
@@ -187,12 +189,15 @@ def mean_of(rows: Any, key: str) -> float:
 
 def print_result(result: dict[str, Any]) -> None:
     for name, rows in result["models"].items():
-        print(f"\n| {name} | connected | area | IoU | angle, median and 90 % |\n|---|---|---|---|---|")
+        print(
+            f"\n| {name} | connected | area | IoU | angle, median and 90 % |\n|---|---|---|---|---|"
+        )
         for kind, row in rows.items():
             angle = row.get("angles")
             text = f"{angle['median']:.3f} {angle['p90']:.3f}" if angle else ""
             print(
-                f"| {kind} | {row['connected']:.1%} | {row['area']:.1%} | {row['iou']:.3f} | {text} |"
+                f"| {kind} | {row['connected']:.1%} | {row['area']:.1%} | {row['iou']:.3f} "
+                f"| {text} |"
             )
     for name, angle in result["angles"].items():
         print(f"{name}: {angle['median']:.3f} {angle['p90']:.3f}")

@@ -90,5 +90,5 @@ def travel_directions(
 def _unit(vectors: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return vectors (2, ...) of length 1; what is next to 0 becomes 0."""
     length = np.hypot(*vectors)
-    unit: NDArray[np.float32] = vectors / np.where(length > 1e-4, length, np.float32(np.inf))
-    return unit
+    unit = vectors / np.where(length > 1e-4, length, np.float32(np.inf))
+    return np.asarray(unit, np.float32)

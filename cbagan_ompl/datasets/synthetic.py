@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from ..common.validation import check_at_least, check_fraction
 from ..map_generators import MAP_GENERATORS, MIN_SIZE, check_generators
 from ..map_generators.randomization import randomized_map
-from .dataset import Tasks
 from ..map_generators.shapes import inflate
+from .dataset import Tasks
 from .geodesic_labels import EPSILON, SLACK, geodesic_label, travel_directions
 
 #: Tasks on each map.

@@ -95,9 +95,10 @@ def scanned_map(rng: np.random.Generator, width: int, height: int) -> Mask:
     if rng.random() < 0.6:
         bent = cv2.warpAffine(bent, turned, (width, height), flags=cv2.INTER_LINEAR)
     noise = gaussian_filter(rng.standard_normal((height, width)), rng.uniform(0.4, 1.0))
-    free = bent + rng.uniform(0.1, 0.5) * noise > rng.uniform(0.4, 0.7)
+    free: Mask = bent + rng.uniform(0.1, 0.5) * noise > rng.uniform(0.4, 0.7)
     specks = rng.random(free.shape) < rng.uniform(0.0, 0.01)
-    return fill_pockets(free & ~specks)
+    np.logical_and(free, ~specks, out=free)
+    return fill_pockets(free)
 
 
 def reduced_map(rng: np.random.Generator, width: int, height: int) -> Mask:
@@ -112,7 +113,8 @@ def reduced_map(rng: np.random.Generator, width: int, height: int) -> Mask:
     while True:
         factor = 2 if rng.random() < 0.7 else 3
         large = _REDUCED[int(rng.integers(len(_REDUCED)))](rng, factor * width, factor * height)
-        free = fill_pockets(large.reshape(height, factor, width, factor).any(axis=(1, 3)))
+        blocks = large.reshape(height, factor, width, factor)
+        free = fill_pockets(np.asarray(blocks.any(axis=(1, 3))))
         if free.mean() < 0.9:  # not all walls are lost
             return free
 
@@ -130,7 +132,9 @@ def _draw_wall(
     free[pixels > 0] = not blocked
 
 
-def _unit_noise(rng: np.random.Generator, width: int, height: int, scale: float) -> NDArray[np.float64]:
+def _unit_noise(
+    rng: np.random.Generator, width: int, height: int, scale: float
+) -> NDArray[np.float64]:
     """Return smooth noise of unit variance."""
     noise = gaussian_filter(rng.standard_normal((height, width)), scale)
     unit: NDArray[np.float64] = noise / noise.std()

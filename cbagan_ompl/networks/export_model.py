@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import torch
 from torch import Tensor, nn
-from torch.nn import functional
 
 from .encoding import SPOT_RADIUS, map_image, point_image, region_probability
 from .generator import Generator
 from .passage_generator import PassageGenerator
-from .passages import endpoint_nodes
+from .passage_model import PassageModel
 from .patch_generator import PatchGenerator, endpoint_cells
+from .tiles import make_free_stem, make_linear, pad_to_stride, tiles_of
 
 #: The generators.
 AnyGenerator = Generator | PatchGenerator | PassageGenerator
@@ -98,85 +98,6 @@ class SplitModel(RegionModel):
         return probability
 
 
-class PassageModel(nn.Module):
-    """A :class:`PassageGenerator` without its images, in parts that can be called by themselves.
-
-    What :meth:`read_map` returns depends on the map alone. Between it and :meth:`paint` come the
-    nodes and the distances, which have no weights: a program computes them by compiled code
-    (:mod:`.full_nodes`, :mod:`.fast_marching`).
-
-    Args:
-        generator: with its trained weights, in evaluation mode.
-    """
-
-    def __init__(self, generator: PassageGenerator) -> None:
-        super().__init__()
-        self.generator = generator
-        self.stride = generator.stride
-        self.map_stem = _make_free_stem(generator.map_stem)
-        no_noise = generator.noise_stem(torch.zeros(1, 1, generator.cell, generator.cell))
-        self.no_noise = nn.Parameter(no_noise.detach(), requires_grad=False)
-
-    def forward(self, free: Tensor, start: Tensor, goal: Tensor) -> Tensor:
-        """Return the probability of the region, as :meth:`RegionModel.forward`."""
-        height, width = free.size(2), free.size(3)
-        features, costs = self.read_map(free)
-        free = pad_to_stride(free, self.stride)
-        codes = self.generator.codes(free)
-        nodes = endpoint_nodes(start, codes), endpoint_nodes(goal, codes)
-        distances, towards = self.generator.distances(costs, codes, nodes[0], nodes[1])
-        region = self.generator.paint(features, costs, codes, distances, towards, free)[0]
-        return region[:, :, :height, :width]
-
-    @torch.jit.export
-    def read_map(self, free: Tensor) -> list[Tensor]:
-        """Return the features and the costs of the patches of a map.
-
-        Args:
-            free: (B, 1, H, W) in [0, 1], 1 where free, of any size.
-
-        Returns:
-            (B, stem, h, w) and (B, 4, h, w), see :meth:`PassageGenerator.encode`; of h x w patches,
-            to which the map is padded.
-        """
-        tiles = tiles_of(pad_to_stride(free, self.stride), 4)
-        map_features = torch.relu(self.map_stem(tiles)).permute(0, 3, 1, 2)
-        features, costs = self.generator.encode(map_features, self.no_noise)
-        return [features, costs.contiguous()]
-
-    @torch.jit.export
-    def paint(
-        self,
-        kept: list[Tensor],
-        codes: Tensor,
-        distances: Tensor,
-        towards: Tensor,
-        free: Tensor,
-    ) -> list[Tensor]:
-        """Return the probability of the region, and the directions of travel.
-
-        Args:
-            kept: from :meth:`read_map`.
-            codes: (B, 4, h, w) int32, see :func:`.passages.patch_codes`.
-            distances: (B, 2, 4, h, w), see :func:`.passages.distance_fields`.
-            towards: (B, 2, 2, 4, h, w), see :func:`.passages.directions`.
-            free: (B, 1, 4 h, 4 w), 1 where free: the map with its padding.
-
-        Returns:
-            (B, 1, 4 h, 4 w) in [0, 1], and (B, 2, h, w): unit vectors (u, v), v down, of each
-            patch; 0 where no path leads.
-        """
-        features, costs = kept[0], kept[1]
-        region, vectors = self.generator.paint(features, costs, codes, distances, towards, free)
-        return [region, vectors]
-
-
-def pad_to_stride(free: Tensor, stride: int) -> Tensor:
-    """Return maps with blocked pixels to the right and below, up to multiples of a stride."""
-    right, below = -free.size(3) % stride, -free.size(2) % stride
-    return functional.pad(free, [0, right, 0, below]) if right > 0 or below > 0 else free
-
-
 def make_region_model(generator: AnyGenerator) -> RegionModel | PassageModel:
     """Return what is exported of a generator with its trained weights, in evaluation mode."""
     if isinstance(generator, PassageGenerator):
@@ -221,7 +142,7 @@ class PatchModel(nn.Module):
         # The spot of a point touches no more cells than that in a row, and no map has fewer.
         self.window = 3
         self.reach = SPOT_RADIUS + 0.5
-        self.map_stem = _make_free_stem(generator.map_stem)
+        self.map_stem = make_free_stem(generator.map_stem)
         self.point_stem = _make_point_stem(generator.point_stem, generator.noise_stem)
         white = self.point_stem(torch.ones(1, 1, 1, self.point_stem.in_features))
         self.white_features = nn.Parameter(white.detach().permute(0, 3, 1, 2), requires_grad=False)
@@ -307,39 +228,8 @@ class PatchModel(nn.Module):
         return features, cells.view(batch, 2, height, width)
 
 
-def tiles_of(images: Tensor, size: int) -> Tensor:
-    """Return the square tiles of images, with all values of a tile in one row.
-
-    Args:
-        images: (B, C, H, W), H and W multiples of ``size``.
-        size: of a tile, in pixels.
-
-    Returns:
-        (B, H / size, W / size, C size^2): channel by channel, row by row.
-    """
-    batch, channels, height, width = images.shape
-    split = images.view(batch, channels, height // size, size, width // size, size)
-    return split.permute(0, 2, 4, 1, 3, 5).flatten(3)
-
-
-def _make_free_stem(stem: nn.Conv2d) -> nn.Linear:
-    """Return a map stem that reads the pixels of a patch, 1 where free, not three colours."""
-    assert stem.bias is not None
-    return _make_linear(2 * stem.weight.sum(1), stem.bias - stem.weight.sum((1, 2, 3)))
-
-
 def _make_point_stem(stem: nn.Conv2d, noise_stem: nn.Conv2d) -> nn.Linear:
     """Return a point stem that reads tiles, with the output of the noise stem for no noise."""
     assert stem.bias is not None
     assert noise_stem.bias is not None
-    return _make_linear(stem.weight, stem.bias + noise_stem.bias)
-
-
-def _make_linear(weight: Tensor, bias: Tensor) -> nn.Linear:
-    """Return the layer that does to the tiles of :func:`tiles_of` what a convolution does."""
-    flat = weight.flatten(1)
-    linear = nn.Linear(flat.size(1), flat.size(0))
-    with torch.no_grad():
-        linear.weight.copy_(flat)
-        linear.bias.copy_(bias)
-    return linear
+    return make_linear(stem.weight, stem.bias + noise_stem.bias)

@@ -8,8 +8,8 @@ from ..errors import ConfigError
 from .attention import Attention
 from .config import MAX_WEIGHTS, NetworkConfig
 from .discriminator import Discriminator
-from .generator import Generator
 from .export_model import AnyGenerator
+from .generator import Generator
 from .passage_generator import PassageGenerator
 from .patch_generator import PatchGenerator
 

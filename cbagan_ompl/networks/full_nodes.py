@@ -34,14 +34,13 @@ def full_nodes(
         ([65535, 0, 0, 0], [[4112, 4097], [272, 257]])
     """
     edges = [
-        np.append(np.arange(n) * size // n, size)
-        for n, size in zip(shape, free.shape, strict=True)
+        np.append(np.arange(n) * size // n, size) for n, size in zip(shape, free.shape, strict=True)
     ]
     nodes = np.zeros(free.shape, np.uint8)
     codes = np.zeros((4, *patches), np.int32)
     linked = np.zeros((4, *patches), np.uint16)
     _label(free, edges[0], edges[1], nodes, codes)
-    _link(nodes, edges[0][::4], edges[1][::4], linked)
+    _link(nodes, edges[0][:-1:4], edges[1][:-1:4], linked)
     return codes, linked
 
 
@@ -63,8 +62,7 @@ def full_node_of(
         The index into the codes, flattened, as of :func:`.passages.endpoint_nodes`.
     """
     rows, columns = (
-        np.append(np.arange(n) * size // n, size)
-        for n, size in zip(shape, free.shape, strict=True)
+        np.append(np.arange(n) * size // n, size) for n, size in zip(shape, free.shape, strict=True)
     )
     row = (int(np.searchsorted(rows, pixel[1], "right")) - 1) // 4
     column = (int(np.searchsorted(columns, pixel[0], "right")) - 1) // 4
@@ -77,7 +75,7 @@ def full_node_of(
     widths = columns[4 * column : 4 * column + 5] - left
     _label(np.ascontiguousarray(block), heights, widths, nodes, own)
     node = max(0, int(nodes[pixel[1] - top, pixel[0] - left]) - 1)
-    return (node * codes.shape[1] + row) * codes.shape[2] + column
+    return int((node * codes.shape[1] + row) * codes.shape[2] + column)
 
 
 @compiled
@@ -90,96 +88,124 @@ def _label(
 ) -> None:  # pragma: no cover
     """Find the node of each pixel, from 1, and the codes of the nodes, both in place."""
     height, width = len(row_edges) - 1, len(column_edges) - 1
-    largest = 0
-    for i in range(0, height, 4):
-        for j in range(0, width, 4):
-            rows = row_edges[min(i + 4, height)] - row_edges[i]
-            columns = column_edges[min(j + 4, width)] - column_edges[j]
-            largest = max(largest, rows * columns)
-    stack = np.empty(largest, np.int64)
-    labels = np.zeros(largest, np.int32)
-    keys = np.zeros(largest + 1, np.int64)
-    rank = np.zeros(largest + 1, np.uint8)
-    for i in range(0, height, 4):
-        for j in range(0, width, 4):
-            top, bottom = row_edges[i], row_edges[min(i + 4, height)]
-            left, right = column_edges[j], column_edges[min(j + 4, width)]
-            block = free[top:bottom, left:right]
-            count = 0
-            for y in range(bottom - top):
-                for x in range(right - left):
-                    count += block[y, x]
-            if count == 0:
-                continue
+    most = 16 * np.max(np.diff(row_edges)) * np.max(np.diff(column_edges))
+    labels, stack = np.empty(most, np.int32), np.empty(most, np.int64)
+    for row in range(0, height, 4):
+        rows = row_edges[row : min(row + 4, height) + 1]
+        for column in range(0, width, 4):
+            columns = column_edges[column : min(column + 4, width) + 1]
+            block = free[rows[0] : rows[-1], columns[0] : columns[-1]]
+            own = nodes[rows[0] : rows[-1], columns[0] : columns[-1]]
+            code = codes[:, row // 4, column // 4]
+            count = _count(block)
             if count == block.size:
-                nodes[top:bottom, left:right] = 1
-            else:
-                _rank(block, labels, stack, keys, rank)
-                columns = right - left
-                for y in range(bottom - top):
-                    for x in range(columns):
-                        if block[y, x]:
-                            nodes[top + y, left + x] = rank[labels[y * columns + x]]
-            for a in range(i, min(i + 4, height)):
-                for b in range(j, min(j + 4, width)):
-                    bit = 1 << (4 * (a - i) + b - j)
-                    if count == block.size:
-                        codes[0, i // 4, j // 4] |= bit
-                        continue
-                    for y in range(row_edges[a], row_edges[a + 1]):
-                        for x in range(column_edges[b], column_edges[b + 1]):
-                            if nodes[y, x]:
-                                codes[nodes[y, x] - 1, i // 4, j // 4] |= bit
+                own[:] = 1
+            elif count > 0:
+                _label_patch(block, labels, stack, own)
+            if count > 0:
+                _set_bits(own, rows, columns, count == block.size, code)
 
 
 @compiled
-def _rank(
+def _count(block: NDArray[np.bool_]) -> int:  # pragma: no cover
+    """Return the number of free pixels."""
+    count = 0
+    for row in range(block.shape[0]):
+        for column in range(block.shape[1]):
+            count += block[row, column]
+    return count
+
+
+@compiled
+def _set_bits(
+    nodes: NDArray[np.uint8],
+    rows: NDArray[np.int64],
+    columns: NDArray[np.int64],
+    all_free: bool,
+    code: NDArray[np.int32],
+) -> None:  # pragma: no cover
+    """Set the bits of the nodes of a patch.
+
+    Args:
+        nodes: of the pixels.
+        rows: of the full map where the rows of the scaled one begin, and where the last ends.
+        columns: the same.
+        all_free: whether there is one node, of all pixels.
+        code: of each node, changed in place.
+    """
+    for i in range(len(rows) - 1):
+        for j in range(len(columns) - 1):
+            bit = 1 << (4 * i + j)
+            if all_free:
+                code[0] |= bit
+                continue
+            for row in range(rows[i] - rows[0], rows[i + 1] - rows[0]):
+                for column in range(columns[j] - columns[0], columns[j + 1] - columns[0]):
+                    if nodes[row, column]:
+                        code[nodes[row, column] - 1] |= bit
+
+
+@compiled
+def _label_patch(
     block: NDArray[np.bool_],
     labels: NDArray[np.int32],
     stack: NDArray[np.int64],
-    keys: NDArray[np.int64],
-    rank: NDArray[np.uint8],
+    nodes: NDArray[np.uint8],
 ) -> None:  # pragma: no cover
-    """Label the components of a block, and find the node of each label, in place."""
-    rows, columns = block.shape
-    labels[: rows * columns] = 0
+    """Find the nodes of the pixels of a patch, in place.
+
+    Args:
+        block: the pixels, true where free.
+        labels: room for one number for each pixel.
+        stack: the same.
+        nodes: of the pixels, from 1; 0 where blocked or left out.
+    """
+    columns = block.shape[1]
+    labels[: block.size] = 0
+    # The largest components that can be passed through, then the others: by one key.
+    keys = np.zeros(block.size + 1, np.int64)
     count = 0
-    through = rows * columns + 1
-    for first in range(rows * columns):
-        if labels[first] or not block[first // columns, first % columns]:
-            continue
-        count += 1
-        labels[first] = count
-        stack[0], waiting, size, contacts = first, 1, 0, 0
-        while waiting:
-            waiting -= 1
-            pixel = stack[waiting]
-            y, x = pixel // columns, pixel % columns
-            size += 1
-            contacts += (y == 0) + (y == rows - 1) + (x == 0) + (x == columns - 1)
-            for direction in range(4):
-                v = y + (direction == 0) - (direction == 1)
-                u = x + (direction == 2) - (direction == 3)
-                if 0 <= v < rows and 0 <= u < columns:
-                    other = v * columns + u
-                    if block[v, u] and not labels[other]:
-                        labels[other] = count
-                        stack[waiting] = other
-                        waiting += 1
-        keys[count] = size + (through if contacts > 1 else 0)
-        rank[count] = 0
-    for node in range(1, 5):
-        best = 0
-        for label in range(1, count + 1):
-            if rank[label] == 0 and (best == 0 or keys[label] > keys[best]):
-                best = label
-        if best == 0:
-            return
-        rank[best] = node
-        if node == 4 and keys[best] > through:
-            for label in range(1, count + 1):
-                if rank[label] == 0 and keys[label] > through:
-                    rank[label] = 4
+    for first in range(block.size):
+        if labels[first] == 0 and block[first // columns, first % columns]:
+            count += 1
+            size, contacts = _fill(block, first, count, labels, stack)
+            keys[count] = size + (block.size if contacts > 1 else 0)
+    node_of = np.zeros(count + 1, np.uint8)
+    order = np.argsort(-keys[1 : count + 1], kind="mergesort") + 1
+    for rank in range(count):
+        is_merged = rank > 3 and keys[order[rank]] > block.size
+        if rank < 4 or is_merged:
+            node_of[order[rank]] = min(rank + 1, 4)
+    for row in range(block.shape[0]):
+        for column in range(columns):
+            nodes[row, column] = node_of[labels[row * columns + column]]
+
+
+@compiled
+def _fill(
+    block: NDArray[np.bool_],
+    first: int,
+    label: int,
+    labels: NDArray[np.int32],
+    stack: NDArray[np.int64],
+) -> tuple[int, int]:  # pragma: no cover
+    """Label the component of a pixel; return its size, and its contacts with the border."""
+    rows, columns = block.shape
+    labels[first], stack[0] = label, first
+    waiting, size, contacts = 1, 0, 0
+    while waiting:
+        waiting -= 1
+        row, column = stack[waiting] // columns, stack[waiting] % columns
+        size += 1
+        contacts += (row == 0) + (row == rows - 1) + (column == 0) + (column == columns - 1)
+        for y, x in ((row - 1, column), (row + 1, column), (row, column - 1), (row, column + 1)):
+            if not (0 <= y < rows and 0 <= x < columns) or not block[y, x]:
+                continue
+            if labels[y * columns + x] == 0:
+                labels[y * columns + x] = label
+                stack[waiting] = y * columns + x
+                waiting += 1
+    return size, contacts
 
 
 @compiled
@@ -198,20 +224,18 @@ def _link(
         linked: as of :func:`.fast_marching.link_bits`.
     """
     height, width = nodes.shape
+    rows, columns = np.append(row_edges, height), np.append(column_edges, width)
     for row in range(len(row_edges)):
-        top = row_edges[row]
-        bottom = row_edges[row + 1] if row + 1 < len(row_edges) else height
         for column in range(len(column_edges)):
-            left = column_edges[column]
-            right = column_edges[column + 1] if column + 1 < len(column_edges) else width
+            right, bottom = columns[column + 1], rows[row + 1]
             if right < width:
-                for y in range(top, bottom):
+                for y in range(rows[row], bottom):
                     a, b = nodes[y, right - 1], nodes[y, right]
                     if a and b:
                         linked[a - 1, row, column] |= 1 << (3 + b)
                         linked[b - 1, row, column + 1] |= 1 << (a - 1)
             if bottom < height:
-                for x in range(left, right):
+                for x in range(columns[column], right):
                     a, b = nodes[bottom - 1, x], nodes[bottom, x]
                     if a and b:
                         linked[a - 1, row, column] |= 1 << (11 + b)

@@ -22,7 +22,7 @@ class FastMarching(torch.autograd.Function):
     """
 
     @staticmethod
-    def forward(  # type: ignore[override]
+    def forward(
         ctx: Any, costs: Tensor, codes: Tensor, start: Tensor, goal: Tensor
     ) -> tuple[Tensor, Tensor]:
         """Return the distances and the directions."""
@@ -35,7 +35,7 @@ class FastMarching(torch.autograd.Function):
         return torch.from_numpy(distances), towards
 
     @staticmethod
-    def backward(ctx: Any, gradient: Tensor, _: Tensor) -> tuple[Tensor | None, ...]:  # type: ignore[override]
+    def backward(ctx: Any, gradient: Tensor, _: Tensor) -> tuple[Tensor | None, ...]:
         """Return the gradient by the costs."""
         cost_values, linked, distances = ctx.values
         result = np.zeros_like(cost_values)
@@ -81,33 +81,35 @@ def _descend(
         height: of the map, in patches.
         width: of the map, in patches.
     """
-    cells = height * width
-    steps = np.array((-1, 1, -width, width))
-    parents = np.empty(2, np.int64)
     for node in order:
         if gradient[node] == 0 or values[node] >= UNREACHED or values[node] == 0:
             continue
-        bits, cell = linked[node], node % cells
-        parents[:] = -1
-        for direction in range(4):
-            for part in range(4):
-                if (bits >> (4 * direction + part)) & 1:
-                    other = cell + steps[direction] + part * cells
-                    axis = direction // 2
-                    if parents[axis] < 0 or values[other] < values[parents[axis]]:
-                        parents[axis] = other
-        cost, slope = costs[node], gradient[node]
-        if parents[0] >= 0 and parents[1] >= 0:
-            across, along = values[parents[0]], values[parents[1]]
-            if abs(across - along) < cost:
-                u, v = values[node] - across, values[node] - along
-                total = u + v
-                gradient[parents[0]] += slope * u / total
-                gradient[parents[1]] += slope * v / total
-                result[node] += slope * cost / total
-                continue
-            nearer = 0 if across < along else 1
-        else:
-            nearer = 0 if parents[0] >= 0 else 1
-        gradient[parents[nearer]] += slope
-        result[node] += slope
+        across, along = _parents(linked, values, node, height * width, width)
+        slope, cost = gradient[node], costs[node]
+        if across < 0 or along < 0 or abs(values[across] - values[along]) >= cost:
+            is_across = along < 0 or (across >= 0 and values[across] < values[along])
+            gradient[across if is_across else along] += slope
+            result[node] += slope
+            continue
+        u, v = values[node] - values[across], values[node] - values[along]
+        gradient[across] += slope * u / (u + v)
+        gradient[along] += slope * v / (u + v)
+        result[node] += slope * cost / (u + v)
+
+
+@compiled
+def _parents(
+    linked: NDArray[np.uint16], values: NDArray[np.float32], node: int, cells: int, width: int
+) -> tuple[int, int]:  # pragma: no cover
+    """Return the nearest of the nodes linked along each axis, -1 for none."""
+    cell = node % cells
+    parents = np.full(2, -1, np.int64)
+    for direction in range(4):
+        axis = direction // 2
+        step = (width if axis else 1) * (1 if direction % 2 else -1)
+        for part in range(4):
+            other = part * cells + cell + step
+            is_linked = (linked[node] >> (4 * direction + part)) & 1
+            if is_linked and (parents[axis] < 0 or values[other] < values[parents[axis]]):
+                parents[axis] = other
+    return parents[0], parents[1]

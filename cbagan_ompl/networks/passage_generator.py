@@ -76,6 +76,8 @@ class PassageGenerator(nn.Module):
         self.fuse = _convolution(stem + _DISTANCE_FEATURES, stem)
         self.head = nn.Linear(stem, PATCH**2 + 2)
         self.gain = nn.Parameter(torch.ones(1))
+        self.table: Tensor
+        self.offsets: Tensor
         self.register_buffer("table", component_table(), persistent=False)
         # Of the pixels of a patch from its centre, in patches: (2, 16), to the right and down.
         offsets = (torch.arange(PATCH) + 0.5) / PATCH - 0.5
@@ -100,9 +102,9 @@ class PassageGenerator(nn.Module):
             no path leads.
         """
         free = free_space(map_image)
-        features, costs = self.encode(
-            torch.relu(self.map_stem(map_image)), self.noise_stem(self.noise_gain * noise)
-        )
+        map_features = torch.relu(self.map_stem(map_image))
+        merged = self.merge(map_features) + self.noise_stem(self.noise_gain * noise)
+        features, costs = self.encode(map_features, torch.relu(self.norm(merged)))
         codes = self.codes(free)
         start, goal = spot_centres(point_image)
         distances, towards = self.distances(
@@ -115,17 +117,16 @@ class PassageGenerator(nn.Module):
         """Return the nodes of each patch, see :func:`.passages.patch_codes`."""
         return patch_codes(free, self.table)
 
-    def encode(self, map_features: Tensor, noise_features: Tensor) -> tuple[Tensor, Tensor]:
+    def encode(self, map_features: Tensor, half: Tensor) -> tuple[Tensor, Tensor]:
         """Return the features and the costs of the patches: what depends on the map alone.
 
         Args:
             map_features: (B, stem, h, w), from the map stem.
-            noise_features: (B, width, h / 2, w / 2), from the noise stem; or with sizes of 1.
+            half: (B, width, h / 2, w / 2), from those of 2 x 2 patches and the noise.
 
         Returns:
             (B, stem, h, w), and (B, 4, h, w) float32, positive.
         """
-        half = torch.relu(self.norm(self.merge(map_features) + noise_features))
         patches = functional.pixel_shuffle(self.split(self.trunk(half)), 2)
         features = self.refine(torch.relu(patches + map_features))
         costs = self.costs(features).float().clamp(-2.0, 3.0).exp()
@@ -138,7 +139,7 @@ class PassageGenerator(nn.Module):
 
         See :mod:`.passages`: (B, 2, 4, h, w) and (B, 2, 2, 4, h, w), from start and goal.
         """
-        if not torch.jit.is_scripting():
+        if not torch.jit.is_scripting():  # type: ignore[attr-defined]
             return _march(costs, codes, start, goal)
         fields = distance_fields(costs, codes, start, goal, self.rounds)
         return fields, directions(fields, codes)
@@ -231,7 +232,7 @@ def _march(costs: Tensor, codes: Tensor, start: Tensor, goal: Tensor) -> tuple[T
     # Here, since numba takes long to import.
     from .marching_gradients import FastMarching
 
-    result: tuple[Tensor, Tensor] = FastMarching.apply(costs, codes, start, goal)
+    result: tuple[Tensor, Tensor] = FastMarching.apply(costs, codes, start, goal)  # type: ignore[no-untyped-call]
     return result
 
 

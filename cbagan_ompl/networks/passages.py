@@ -2,8 +2,8 @@
 
 A patch of 4 x 4 pixels is a 16-bit number, its code: bit 4 * row + column is 1 where free. Its free
 pixels fall into 4-connected components, and those that touch the border of the patch in more than
-one place can be passed through. A patch has four nodes: the three largest of these, and all
-others together (or, if there are fewer, components that are dead ends). Two nodes of neighbouring patches
+one place can be passed through. A patch has four nodes: the three largest of these, and all others
+together (or, if there are fewer, components that are dead ends). Two nodes of neighbouring patches
 are linked where free pixels of both touch across the common side. So paths in the graph are paths
 on the map, and the other way round, but for patches that can be passed in five ways at once.
 """
@@ -41,13 +41,14 @@ def component_table() -> Tensor:
     rest = codes.clone()
     while rest.any():
         component = _grow(rest & -rest, codes)
-        contacts = sum(_count_bits(component & side) for side in (_LEFT, _RIGHT, _TOP, _BOTTOM))
+        sides = (_LEFT, _RIGHT, _TOP, _BOTTOM)
+        contacts = torch.stack([_count_bits(component & side) for side in sides]).sum(0)
         components.append(component)
-        keys.append(torch.where(contacts > 1, 32, 0) + _count_bits(component))
+        keys.append(32 * (contacts > 1) + _count_bits(component))
         rest &= ~component
     order = torch.stack(keys).sort(dim=0, descending=True, stable=True)
     ranked = torch.stack(components).gather(0, order.indices)
-    others = torch.where(order.values[3:] > 32, ranked[3:], 0).sum(0, dtype=torch.int32)
+    others = (ranked[3:] * (order.values[3:] > 32)).sum(0, dtype=torch.int32)
     last = torch.where(others > 0, others, ranked[3])
     return torch.cat((ranked[:3], last[None])).T.to(torch.int16).contiguous()
 
@@ -171,7 +172,8 @@ def distance_fields(
         rounds: limit of their number.
 
     Returns:
-        (B, 2, 4, h, w): by endpoint and node; 1e4 where no path leads.
+        (B, 2, 4, h, w): by endpoint and node; 1e4 where no path leads, or none that is short
+        enough to be of use, see :data:`.fast_marching.REACH`.
     """
     with torch.no_grad():
         sources = torch.stack((start, goal))
@@ -191,7 +193,10 @@ def distance_fields(
             distance = best
             if is_done:
                 break
-        return distance.transpose(0, 1).contiguous()
+        others = sources.flip(0)[..., None]
+        limit = 1.5 * distance.flatten(2).gather(2, others) + 4.0
+        is_far = distance > limit[..., None, None]
+        return distance.masked_fill(is_far, 1e4).transpose(0, 1).contiguous()
 
 
 def directions(distance: Tensor, codes: Tensor) -> Tensor:

@@ -23,9 +23,7 @@ from ..inference.model_files import (
     read_manifest,
     read_record,
 )
-from ..networks.export_model import make_region_model
-from ..networks.generator import Generator
-from ..networks.patch_generator import PatchGenerator
+from ..networks.export_model import AnyGenerator, make_region_model
 from .checkpoints import best_generator, load_checkpoint
 from .model_weights import recover_generator
 from .torchscript import save_script
@@ -92,9 +90,7 @@ def export(
     return record
 
 
-def _read_source(
-    path: Path, name: str, note: str
-) -> tuple[Generator | PatchGenerator, dict[str, Any]]:
+def _read_source(path: Path, name: str, note: str) -> tuple[AnyGenerator, dict[str, Any]]:
     """Return the generator of a checkpoint or of an exported model, and the record of its export.
 
     Args:

@@ -154,7 +154,7 @@ def direction_loss(vectors: Tensor, target: Tensor, region: Tensor) -> Tensor:
         region: the true region, (B, 1, H, W) in [0, 1]: its mean in a patch is the patch's weight.
     """
     length = (target[:, 0].square() + target[:, 1].square()).sqrt()
-    weight = length * functional.adaptive_avg_pool2d(region, target.shape[2:])[:, 0]
+    weight = length * functional.adaptive_avg_pool2d(region, (target.size(2), target.size(3)))[:, 0]
     cosine = (vectors * target).sum(1) / length.clamp(min=1e-6)
     return (weight * (1 - cosine)).sum() / weight.sum().clamp(min=1e-6)
 

@@ -84,9 +84,7 @@ def generator_step(
             + weights[1] * losses.adversarial_loss(point_logits)
         )
     if painted.direction is not None:
-        parts["direction"] = losses.direction_loss(
-            painted.direction, batch.direction, batch.region
-        )
+        parts["direction"] = losses.direction_loss(painted.direction, batch.direction, batch.region)
     loss = losses.generator_loss(
         parts.get("adversarial", fake.new_zeros(())),
         parts["pixel"],

@@ -44,9 +44,7 @@ def _predict(
         indices = np.arange(first, min(first + batch_size, len(tasks)))
         batch = make_batch(tasks, indices, device)
         images = encode(batch)
-        image = Painted.of(
-            generator(images.map, images.points, torch.zeros_like(batch.free))
-        ).image
+        image = Painted.of(generator(images.map, images.points, torch.zeros_like(batch.free))).image
         yield (region_probability(image)[:, 0] >= REGION_THRESHOLD).cpu().numpy()
 
 
