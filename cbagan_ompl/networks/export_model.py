@@ -8,7 +8,12 @@ from torch.nn import functional
 
 from .encoding import SPOT_RADIUS, map_image, point_image, region_probability
 from .generator import Generator
+from .passage_generator import PassageGenerator
+from .passages import endpoint_nodes
 from .patch_generator import PatchGenerator, endpoint_cells
+
+#: The generators.
+AnyGenerator = Generator | PatchGenerator | PassageGenerator
 
 
 class RegionModel(nn.Module):
@@ -42,11 +47,7 @@ class RegionModel(nn.Module):
 
     def padded(self, free: Tensor) -> Tensor:
         """Return a map with blocked pixels to the right and below, up to the stride."""
-        right, below = -free.size(3) % self.stride, -free.size(2) % self.stride
-        # A graph for ONNX is traced: it has no branches.
-        if torch.jit.is_scripting() and right == 0 and below == 0:  # type: ignore[attr-defined]
-            return free
-        return functional.pad(free, [0, right, 0, below])
+        return pad_to_stride(free, self.stride)
 
 
 class SplitModel(RegionModel):
@@ -97,8 +98,92 @@ class SplitModel(RegionModel):
         return probability
 
 
-def make_region_model(generator: Generator | PatchGenerator) -> RegionModel:
+class PassageModel(nn.Module):
+    """A :class:`PassageGenerator` without its images, in parts that can be called by themselves.
+
+    What :meth:`read_map` returns depends on the map alone. Between it and :meth:`paint` come the
+    nodes and the distances, which have no weights: a program computes them by compiled code
+    (:mod:`.full_nodes`, :mod:`.fast_marching`).
+
+    Args:
+        generator: with its trained weights, in evaluation mode.
+    """
+
+    def __init__(self, generator: PassageGenerator) -> None:
+        super().__init__()
+        self.generator = generator
+        self.stride = generator.stride
+        self.map_stem = _make_free_stem(generator.map_stem)
+        no_noise = generator.noise_stem(torch.zeros(1, 1, generator.cell, generator.cell))
+        self.no_noise = nn.Parameter(no_noise.detach(), requires_grad=False)
+
+    def forward(self, free: Tensor, start: Tensor, goal: Tensor) -> Tensor:
+        """Return the probability of the region, as :meth:`RegionModel.forward`."""
+        height, width = free.size(2), free.size(3)
+        features, costs = self.read_map(free)
+        free = pad_to_stride(free, self.stride)
+        codes = self.generator.codes(free)
+        nodes = endpoint_nodes(start, codes), endpoint_nodes(goal, codes)
+        distances, towards = self.generator.distances(costs, codes, nodes[0], nodes[1])
+        region = self.generator.paint(features, costs, codes, distances, towards, free)[0]
+        return region[:, :, :height, :width]
+
+    @torch.jit.export
+    def read_map(self, free: Tensor) -> list[Tensor]:
+        """Return the features and the costs of the patches of a map.
+
+        Args:
+            free: (B, 1, H, W) in [0, 1], 1 where free, of any size.
+
+        Returns:
+            (B, stem, h, w) and (B, 4, h, w), see :meth:`PassageGenerator.encode`; of h x w patches,
+            to which the map is padded.
+        """
+        tiles = tiles_of(pad_to_stride(free, self.stride), 4)
+        map_features = torch.relu(self.map_stem(tiles)).permute(0, 3, 1, 2)
+        features, costs = self.generator.encode(map_features, self.no_noise)
+        return [features, costs.contiguous()]
+
+    @torch.jit.export
+    def paint(
+        self,
+        kept: list[Tensor],
+        codes: Tensor,
+        distances: Tensor,
+        towards: Tensor,
+        free: Tensor,
+    ) -> list[Tensor]:
+        """Return the probability of the region, and the directions of travel.
+
+        Args:
+            kept: from :meth:`read_map`.
+            codes: (B, 4, h, w) int32, see :func:`.passages.patch_codes`.
+            distances: (B, 2, 4, h, w), see :func:`.passages.distance_fields`.
+            towards: (B, 2, 2, 4, h, w), see :func:`.passages.directions`.
+            free: (B, 1, 4 h, 4 w), 1 where free: the map with its padding.
+
+        Returns:
+            (B, 1, 4 h, 4 w) in [0, 1], and (B, 2, h, w): unit vectors (u, v), v down, of each
+            patch; 0 where no path leads.
+        """
+        features, costs = kept[0], kept[1]
+        region, vectors = self.generator.paint(features, costs, codes, distances, towards, free)
+        return [region, vectors]
+
+
+def pad_to_stride(free: Tensor, stride: int) -> Tensor:
+    """Return maps with blocked pixels to the right and below, up to multiples of a stride."""
+    right, below = -free.size(3) % stride, -free.size(2) % stride
+    # A graph for ONNX is traced: it has no branches.
+    if torch.jit.is_scripting() and right == 0 and below == 0:  # type: ignore[attr-defined]
+        return free
+    return functional.pad(free, [0, right, 0, below])
+
+
+def make_region_model(generator: AnyGenerator) -> RegionModel | PassageModel:
     """Return what is exported of a generator with its trained weights, in evaluation mode."""
+    if isinstance(generator, PassageGenerator):
+        return PassageModel(generator).eval()
     is_split = isinstance(generator, PatchGenerator) and generator.wavefront is not None
     return (SplitModel if is_split else RegionModel)(generator).eval()
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import warnings
 import zipfile
 from collections.abc import Sequence
@@ -22,11 +23,11 @@ from torch import Tensor, nn
 from ..common.files import write_atomically
 from ..common.validation import require
 from ..errors import ModelError
+from ..inference.choice import make_pipeline
 from ..inference.graphs import Graphs, TorchGraphs
 from ..inference.model_files import RECORD_MEMBER, ModelFormat
 from ..inference.onnx_graphs import flatten
-from ..inference.pipelines import make_pipeline
-from ..networks.export_model import RegionModel
+from ..networks.export_model import PassageModel, RegionModel
 
 _OPSET = 17
 
@@ -34,7 +35,7 @@ _OPSET = 17
 _EXAMPLES = ((1, 2, 1, 2), (3, 3, 2, 3))
 
 
-def save_onnx(model: RegionModel, path: Path, record: dict[str, Any]) -> None:
+def save_onnx(model: RegionModel | PassageModel, path: Path, record: dict[str, Any]) -> None:
     """Write a model as an archive of its graphs and its record.
 
     Args:
@@ -56,7 +57,7 @@ def save_onnx(model: RegionModel, path: Path, record: dict[str, Any]) -> None:
     write_atomically(path, buffer.getvalue(), ModelError)
 
 
-def onnx_graphs(model: RegionModel) -> dict[str, bytes]:
+def onnx_graphs(model: RegionModel | PassageModel) -> dict[str, bytes]:
     """Return the graphs of all functions that a prediction calls, by name.
 
     Args:
@@ -69,7 +70,7 @@ def onnx_graphs(model: RegionModel) -> dict[str, bytes]:
         points = np.linspace(3, 0.9 * model.stride, 2 * tasks, dtype=np.float32).reshape(-1, 2)
         pipeline = make_pipeline(recorder)
         with recorder.ready():
-            pipeline.probabilities(pipeline.read_maps(free), points, points[::-1].copy())
+            pipeline.paint(pipeline.read_maps(free), points, points[::-1].copy())
     one, other = recorders
     return {name: _export(model, name, one.calls[name], other.calls[name]) for name in one.calls}
 
@@ -95,7 +96,7 @@ class _Recorder:
 class _Function(nn.Module):
     """A method of a model, as a module whose inputs and outputs are tensors alone."""
 
-    def __init__(self, model: RegionModel, name: str, inputs: Sequence[Any]) -> None:
+    def __init__(self, model: RegionModel | PassageModel, name: str, inputs: Sequence[Any]) -> None:
         super().__init__()
         self.model, self.name = model, name
         # Of each input: the number of tensors in a list, or 0 for a tensor.
@@ -112,7 +113,7 @@ class _Function(nn.Module):
 
 
 def _export(
-    model: RegionModel,
+    model: RegionModel | PassageModel,
     name: str,
     one: tuple[Sequence[Any], list[NDArray[Any]]],
     other: tuple[Sequence[Any], list[NDArray[Any]]],
@@ -132,6 +133,7 @@ def _export(
         sizes = enumerate(zip(first.shape, second.shape, strict=True))
         axes[names[-1]] = [axis for axis, (size, next_size) in sizes if size != next_size]
     count = len(flatten(one[0]))
+    torch.onnx.register_custom_op_symbolic("aten::exp2", _exp2, _OPSET)
     buffer = io.BytesIO()
     with warnings.catch_warnings(), torch.no_grad():
         # The exporter warns of itself, and of sizes that become constants: none that differ.
@@ -147,3 +149,9 @@ def _export(
             dynamo=False,
         )
     return buffer.getvalue()
+
+
+def _exp2(graph: Any, exponent: Any) -> Any:
+    """Return 2 to the power of a value of a graph: ONNX has the exponential function of base e."""
+    factor = graph.op("Constant", value_t=torch.tensor(math.log(2)))
+    return graph.op("Exp", graph.op("Mul", exponent, factor))
