@@ -1,6 +1,6 @@
 """The overhead of the benchmark: iterations of RRT* inside and outside of it.
 
-    python scripts/overhead.py
+    python scripts/overhead.py --json benchmarks/results/overhead.json
 
 The same task, time limit and parameters, once by a plain SimpleSetup and once by the runner, with
 its count of collision checks, its records of the best cost and OMPL's progress data. The two take
@@ -17,6 +17,7 @@ from tqdm import trange
 
 from cbagan_ompl import GridMap, SamplerOptions, tasks_of
 from cbagan_ompl.benchmarking.logs import parse_log
+from cbagan_ompl.common.files import write_json
 from cbagan_ompl.planning import compat
 from cbagan_ompl.planning.compat import og, ou
 from cbagan_ompl.planning.ompl_benchmark import PlannerVariant, RunOptions, run_benchmark
@@ -30,6 +31,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=15, help="runs of each (default: 15)")
     parser.add_argument("--time", type=float, default=1.0, help="seconds of a run (default: 1)")
+    parser.add_argument("--json", metavar="FILE", help="write the figures as JSON")
     args = parser.parse_args()
     grid = GridMap.load(MAP)
     first = tasks_of(MAP, grid)[0]
@@ -39,6 +41,9 @@ def main() -> None:
         iterations, seconds = inside(grid, task, args.time, seed)
         ratios.append(iterations / outside(grid, task, seconds, seed))
         rates.append(iterations / seconds)
+    if args.json:
+        figures = {"median": float(np.median(ratios)), "ratios": ratios, "rates": rates}
+        write_json(args.json, {"ompl": compat.ompl_version(), **figures})
     print(
         f"OMPL {compat.ompl_version()}: {np.median(rates):.0f} iterations per second inside, "
         f"{np.median(ratios):.3f} of those outside ({np.min(ratios):.3f} to {np.max(ratios):.3f})"

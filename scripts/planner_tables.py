@@ -1,4 +1,4 @@
-"""The table of planners and samplers of one benchmark or several, as Markdown."""
+"""The tables of planners and samplers of benchmarks, as Markdown."""
 
 from __future__ import annotations
 
@@ -8,60 +8,109 @@ from typing import Any
 
 from cbagan_ompl.common.markdown import table
 
-#: Columns of the tables of planners and samplers: ratios to OMPL's own sampler, by their names.
+#: Ratios to OMPL's own sampler, by their names, with the head of their column.
 RATIOS = {
-    "nodes": "nodes",
-    "within_5_percent_s": "to 5 %",
-    "within_5_percent_total_s": "with inference",
+    "nodes_to_first": "nodes to the first path",
+    "first_solution_s": "time to it",
+    "first_solution_total_s": "all counted in",
+    "nodes_to_5_percent": "nodes to 5 %",
+    "within_5_percent_s": "time to 5 %",
+    "within_5_percent_total_s": "all counted in",
 }
-RATIOS_WITH_FIRST = {
-    "nodes": "nodes",
-    "first_solution_s": "first path",
-    "first_solution_total_s": "with inference",
-    "within_5_percent_s": "to 5 %",
-    "within_5_percent_total_s": "with inference",
+
+#: The same without nodes, for an overview.
+RATIOS_OF_TIME = {
+    "first_solution_s": "first path, planning alone",
+    "first_solution_total_s": "first path, all counted in",
+    "within_5_percent_s": "within 5 %, planning alone",
+    "within_5_percent_total_s": "within 5 %, all counted in",
 }
 
 Json = Mapping[str, Any]
 
 
-def planners_table(
-    summaries: Sequence[Json],
+def ratios_table(
+    summary: Json,
     ratios: Mapping[str, str] = RATIOS,
     samplers: Sequence[str] | None = None,
+    planners: Sequence[str] | None = None,
 ) -> str:
-    """Return the table of planners and samplers, for several versions of OMPL side by side.
+    """Return the table of the ratios to OMPL's own sampler.
 
     Args:
-        summaries: the ``summary.json`` of a benchmark, once for each version of OMPL.
-        ratios: the measures that are shown, and the names of their columns.
+        summary: the ``summary.json`` of a benchmark.
+        ratios: the measures that are shown, and the heads of their columns.
         samplers: that are shown, in this order; all but OMPL's own by default.
+        planners: that are shown; all by default.
     """
-    header = ["planner", "sampler"]
-    rows: dict[tuple[str, str], list[str]] = {}
-    for summary in summaries:
-        header += [f"{summary['ompl_version']}: solved", *ratios.values()]
-        own = {row["planner"]: row for row in summary["overall"] if not row["ratios"]}
-        for row in summary["overall"]:
-            if row["ratios"] and (samplers is None or row["sampler"] in samplers):
-                cells = rows.setdefault((row["planner"], row["sampler"]), [])
-                cells += ratio_cells(row, own[row["planner"]], ratios)
-    planners = list(dict.fromkeys(planner for planner, _ in rows))
-    order = list(samplers or dict.fromkeys(sampler for _, sampler in rows))
-    names = sorted(rows, key=lambda name: (planners.index(name[0]), order.index(name[1])))
-    return table(header, [[*name, *rows[name]] for name in names])
+    own = {row["planner"]: row for row in summary["overall"] if not row["ratios"]}
+    rows = [
+        [
+            planner_name(summary, row["planner"]),
+            row["sampler"],
+            f"{own[row['planner']]['success']:.0%} / {row['success']:.0%}",
+            *ratio_cells(row, own[row["planner"]], ratios),
+        ]
+        for row in in_order(summary["overall"], samplers, planners)
+        if row["ratios"]
+    ]
+    return table(["planner", "sampler", "solved", *ratios.values()], rows)
+
+
+def times_table(summary: Json, samplers: Sequence[str]) -> str:
+    """Return the table of milliseconds, everything counted in: what to pick on such maps.
+
+    Args:
+        summary: the ``summary.json`` of a benchmark.
+        samplers: that are shown, in this order.
+    """
+    rows = []
+    for row in in_order(summary["overall"], samplers, None):
+        reached = 1 - row["censored"]["within_5_percent_total_s"]
+        rows.append(
+            [
+                planner_name(summary, row["planner"]),
+                row["sampler"],
+                f"{row['success']:.0%}",
+                milliseconds(row, "first_solution_total_s"),
+                f"{reached:.0%}",
+                milliseconds(row, "within_5_percent_total_s"),
+                length(row["measures"]["final_cost"]["median"]),
+            ]
+        )
+    header = ["planner", "sampler", "solved", "first path", "within 5 %: runs", "time"]
+    return table([*header, "length at the end"], rows)
+
+
+def planner_name(summary: Json, planner: str) -> str:
+    """Return the name of a planner, which says so where its paths are simplified."""
+    simplified = planner in summary["settings"].get("simplify", ())
+    return f"{planner} + simplify" if simplified else planner
+
+
+def in_order(
+    rows: Sequence[Json], samplers: Sequence[str] | None, planners: Sequence[str] | None
+) -> list[Json]:
+    """Return the rows of some samplers and planners, the samplers of a planner in this order."""
+    shown = [
+        row
+        for row in rows
+        if (samplers is None or row["sampler"] in samplers)
+        and (planners is None or row["planner"] in planners)
+    ]
+    order = list(dict.fromkeys(row["planner"] for row in shown))
+    wanted = list(samplers or dict.fromkeys(row["sampler"] for row in shown))
+    return sorted(shown, key=lambda r: (order.index(r["planner"]), wanted.index(r["sampler"])))
 
 
 def ratio_cells(row: Json, own: Json, ratios: Mapping[str, str]) -> list[str]:
-    """Return how many runs were solved, by OMPL's own sampler and by this one, and the ratios."""
-    shown = [
-        # Where most runs of both end at the limit, a ratio of limits would say nothing.
+    """Return the ratios; a dash where most runs of both end before they get there."""
+    return [
         "-"
         if row["censored"][measure] >= 0.5 <= own["censored"][measure]
         else interval_of(row["ratios"][measure])
         for measure in ratios
     ]
-    return [f"{own['success']:.0%} / {row['success']:.0%}", *shown]
 
 
 def interval_of(interval: Mapping[str, float | None]) -> str:
@@ -72,3 +121,15 @@ def interval_of(interval: Mapping[str, float | None]) -> str:
 def ratio_text(value: float | None) -> str:
     """Return a ratio; a missing one is infinite: more than half of the runs did not get there."""
     return "∞" if value is None or math.isinf(value) else f"{value:.2f}"
+
+
+def milliseconds(row: Json, measure: str) -> str:
+    """Return a median time; a dash where most runs did not get there."""
+    if row["censored"][measure] >= 0.5:
+        return "-"
+    return f"{1000 * row['measures'][measure]['median']:.3g} ms"
+
+
+def length(value: float | None) -> str:
+    """Return a length in multiples of the best known one; a dash for that of no path."""
+    return "-" if value is None or math.isinf(value) else f"{value:.3f}"

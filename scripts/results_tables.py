@@ -4,27 +4,34 @@
     python scripts/results_tables.py --summaries results/summary.json
 
 Without options it writes one Markdown table a file into docs/results/generated, where the pages of
-the documentation include them. With ``--summaries`` it prints the table of planners and samplers
-for the ``summary.json`` of benchmarks of your own, one for each version of OMPL.
+the documentation include them, and the table of the README. With ``--summaries`` it prints the
+table of planners and samplers for the ``summary.json`` of benchmarks of your own.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Callable
 from pathlib import Path
 
-from planner_tables import RATIOS_WITH_FIRST, Json, planners_table
+from planner_tables import Json, ratios_table
 from search_speed import speed_table
+from suite_tables import (
+    ROOT,
+    VERSIONS,
+    conditions,
+    overhead,
+    overview,
+    read,
+    rrtconnect,
+    suite_tables,
+    with_table,
+)
 
 from cbagan_ompl.common.files import make_folder, write_atomically
 from cbagan_ompl.common.markdown import table
 
-ROOT = Path(__file__).resolve().parents[1]
-RESULTS = ROOT / "benchmarks" / "results"
 OUTPUT = ROOT / "docs" / "results" / "generated"
-VERSIONS = ("2.0.1", "1.7.0")
 #: What the bundled model is trained on.
 BUNDLED_LABEL = "exact, 5%"
 
@@ -35,37 +42,19 @@ def main() -> None:
         "--output", type=Path, default=OUTPUT, metavar="DIR", help="folder of the tables"
     )
     parser.add_argument(
+        "--readme", type=Path, default=ROOT / "README.md", metavar="FILE", help="file of its table"
+    )
+    parser.add_argument(
         "--summaries", nargs="+", type=Path, metavar="FILE", help="print the table of these instead"
     )
     args = parser.parse_args()
     if args.summaries is not None:
-        print(planners_table([read(path) for path in args.summaries], RATIOS_WITH_FIRST))
+        print("\n\n".join(ratios_table(read(path)) for path in args.summaries))
         return
     make_folder(args.output)
-    for name, make in TABLES.items():
+    for name, make in {**TABLES, **suite_tables()}.items():
         write_atomically(args.output / f"{name}.md", make() + "\n")
-
-
-def read(path: str | Path) -> Json:
-    """Return the content of a JSON file; a relative path begins in benchmarks/results."""
-    content: Json = json.loads((RESULTS / path).read_text(encoding="utf-8"))
-    return content
-
-
-def real_maps() -> str:
-    summaries = [read(f"real_maps_ompl_{version}.json") for version in VERSIONS]
-    return planners_table(summaries, samplers=("learned", "corridor"))
-
-
-def paper_tasks() -> str:
-    summaries = [read(f"paper_suite_ompl_{version}.json") for version in VERSIONS]
-    return planners_table(
-        summaries, samplers=("learned", "paper-trained", "sagan-stored", "corridor")
-    )
-
-
-def bundled_maps() -> str:
-    return planners_table([read("bundled_ompl_2.0.1.json")], RATIOS_WITH_FIRST)
+    args.readme.write_text(with_table(args.readme.read_text(encoding="utf-8")), encoding="utf-8")
 
 
 def unseen_maps_connectivity() -> str:
@@ -92,6 +81,7 @@ def unseen_maps_inference() -> str:
         "of which the network": "inference_ms",
         "of which the check that the region is connected": "kept_ms",
         "repair, where the region is not connected": "repair_ms",
+        "the paper's CBAGAN at the same resolution": "cbagan_ms",
         "a SAGAN of the paper's size at the same resolution": "sagan_ms",
     }
     return table(
@@ -281,7 +271,10 @@ def replanning() -> str:
 TABLES: dict[str, Callable[[], str]] = {
     "unseen_maps_connectivity": unseen_maps_connectivity,
     "unseen_maps_inference": unseen_maps_inference,
-    "real_maps": real_maps,
+    "overview": overview,
+    "conditions": conditions,
+    "rrtconnect": rrtconnect,
+    "overhead": overhead,
     "wrong_heatmaps": wrong_heatmaps,
     "sharpness": sharpness,
     "labels": labels,
@@ -290,8 +283,6 @@ TABLES: dict[str, Callable[[], str]] = {
     "label_noise": label_noise,
     "networks": networks,
     "paper_tables": paper_tables,
-    "paper_tasks": paper_tasks,
-    "bundled_maps": bundled_maps,
     "replanning": replanning,
     "search_speed": lambda: speed_table(read("search_speed.json")),
 }

@@ -25,12 +25,13 @@ from cbagan_ompl.map_generators import MAP_GENERATORS
 from cbagan_ompl.maps.grid_search import prepare_search, shortest_path
 
 GENERATORS = ("offices", "caves", "clutter", "city", "halls", "blocked_cells")
+SIZES = [64, 128, 256, 512, 1024, 1448, 2048]
 ROWS = ("path", "corridor", "repair", "learned")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--sizes", type=int, nargs="+", default=[256, 512, 1024, 2048])
+    parser.add_argument("--sizes", type=int, nargs="+", default=SIZES)
     parser.add_argument("--tasks", type=int, default=2, help="tasks on each map (default: 2)")
     parser.add_argument("--json", metavar="FILE", help="write the figures as JSON")
     args = parser.parse_args()

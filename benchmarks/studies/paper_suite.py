@@ -1,11 +1,12 @@
-"""Tasks of the paper's data set for `cbagan-ompl benchmark`.
+r"""Tasks of the paper's data set for `cbagan-ompl benchmark`.
 
-    python benchmarks/studies/paper_suite.py DATASET --tasks 100 --output paper-suite
-    cbagan-ompl benchmark @paper-suite/tasks.args @benchmarks/suites/paper.args --output results
+    python benchmarks/studies/paper_suite.py DATASET --tasks 30 --output paper-suite \
+        --run @benchmarks/suites/paper.args --model paper-trained=cbagan --output results
 
 DATASET is the folder of the published (map, point, ROI) set. Some of its test tasks are chosen at
 random and written as tasks.csv. The stored predictions, where they come with the set, are written
-as heat maps of a sampler "sagan-stored". tasks.args has the arguments of the benchmark.
+as heat maps of a sampler "sagan-stored". tasks.args has the arguments of the benchmark. With --run
+the benchmark is run on these tasks, with the arguments after it.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cbagan_ompl.cli import main as benchmark
 from cbagan_ompl.datasets.dataset import Dataset, load_dataset
 from cbagan_ompl.datasets.writing import write_csv
 from cbagan_ompl.evaluation.stored_predictions import load_predictions
@@ -29,6 +31,7 @@ def main() -> None:
     parser.add_argument("--tasks", type=int, default=100, help="number of tasks (default: 100)")
     parser.add_argument("--seed", type=int, default=0, help="of the choice of tasks (default: 0)")
     parser.add_argument("--output", type=Path, required=True, metavar="DIR")
+    parser.add_argument("--run", nargs=argparse.REMAINDER, default=[], metavar="ARGUMENT")
     args = parser.parse_args()
     dataset = load_dataset(args.dataset)
     rng = np.random.default_rng(args.seed)
@@ -46,6 +49,8 @@ def main() -> None:
         write_heatmaps(args.dataset, args.output / STORED, chosen, names)
         arguments += ["--heatmap-dir", f"sagan-stored={args.output / STORED}"]
     (args.output / "tasks.args").write_text("\n".join(arguments) + "\n", encoding="utf-8")
+    if args.run:
+        raise SystemExit(benchmark(["benchmark", f"@{args.output / 'tasks.args'}", *args.run]))
 
 
 def map_names(dataset: Dataset, chosen: np.ndarray) -> list[str]:

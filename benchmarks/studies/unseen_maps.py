@@ -52,7 +52,9 @@ def main() -> None:
     predictor = load_model(args.model)
     tasks = select_tasks(args.maps, args.tasks).tasks
     regions, timings = predict_regions(predictor, tasks)
-    timings["sagan_ms"] = sagan_ms(int(predictor.record["working_size"]))
+    for network in ("cbagan", "sagan"):
+        size = int(predictor.record["working_size"])
+        timings[f"{network}_ms"] = paper_network_ms(network, size)
     wrong = plan_with_wrong_heatmaps(predictor, tasks, args.runs)
     result = {"ompl": ompl_version(), "tasks": len(tasks), "regions": regions}
     result |= {"timings": timings, "wrong_heatmaps": wrong}
@@ -100,11 +102,11 @@ def timed(times: list[float], work: Callable[..., Any], *arguments: Any, **optio
     return result
 
 
-def sagan_ms(size: int, calls: int = 5) -> float:
-    """Return the time of one call of a SAGAN of the paper's size; its weights do not matter."""
-    config = NetworkConfig().variant("sagan")
+def paper_network_ms(network: str, size: int, calls: int = 5) -> float:
+    """Return the time of one call of a network of the paper's size; its weights do not matter."""
+    config = NetworkConfig().variant(network)
     module = torch.jit.freeze(torch.jit.script(RegionModel(make_generator(config)).eval()))
-    predictor = Predictor(module, {"working_size": size, "name": "sagan"})
+    predictor = Predictor(module, {"working_size": size, "name": network})
     free, points = np.ones((1, size, size), bool), np.array([[10.0, 10.0]])
     predictor.probabilities(free, points, points + size / 2)
     times: list[float] = []

@@ -12,7 +12,7 @@ from ..common.validation import require_torch, whole_number
 from ..datasets.dataset import load_dataset
 from ..datasets.synthetic import HARD_DETOUR, TASKS_PER_MAP, SyntheticSettings
 from ..errors import ConfigError
-from ..inference.model_files import is_model
+from ..inference.model_files import ModelFormat, is_model
 from ..networks.config import NETWORKS
 from ..training.checkpoint_files import read_checkpoint
 from ..training.config import LAST, PRESETS, TrainingConfig
@@ -170,7 +170,15 @@ def add_export_parser(subparsers: Any) -> None:
         metavar="CHECKPOINT",
         help="best.pt of a training run; or an exported model, to write it anew",
     )
-    parser.add_argument("--output", required=True, metavar="FILE", help="the model file, .pt")
+    parser.add_argument(
+        "--output", required=True, metavar="FILE", help="the model file, .pt or .onnx"
+    )
+    parser.add_argument(
+        "--format",
+        choices=[kind.value for kind in ModelFormat],
+        help="torchscript (.pt) is computed by torch, onnx (.onnx) by ONNX Runtime, a tenth of its "
+        "size; writing it needs the package onnx (default: by the suffix of the file)",
+    )
     parser.add_argument(
         "--note", default="", metavar="TEXT", help="for the card: origin and licence of the data"
     )
@@ -260,6 +268,9 @@ def _print_scores(result: dict[str, Any]) -> None:
 
 
 def _export(args: argparse.Namespace) -> int:
+    if args.format is not None and not args.output.endswith(ModelFormat(args.format).suffix):
+        suffix = ModelFormat(args.format).suffix
+        raise ConfigError(f"--format {args.format} writes a file whose name ends in {suffix}")
     if not is_model(Path(args.checkpoint)):
         read_checkpoint(Path(args.checkpoint))
     require_torch()

@@ -14,6 +14,7 @@ import warnings
 import zipfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -21,6 +22,7 @@ from ..common.files import read_bytes, read_text
 from ..errors import ModelError, show
 from ..networks.config import MAX_IMAGE_SIZE, MAX_WEIGHTS
 from .archives import MAX_EXPANSION, Archive, pack
+from .onnx_graphs import OnnxGraphs
 from .tensor_pickles import check_group
 
 if TYPE_CHECKING:
@@ -110,18 +112,33 @@ def _is_manifest_entry(entry: object) -> bool:
     )
 
 
+class ModelFormat(str, Enum):
+    """What a model is written as."""
+
+    TORCHSCRIPT = "torchscript"
+    ONNX = "onnx"
+
+    @property
+    def suffix(self) -> str:
+        """Of the file."""
+        return ".onnx" if self is ModelFormat.ONNX else ".pt"
+
+
 class ModelFile(NamedTuple):
     """An exported model whose file has been checked.
 
     Attributes:
         record: what it says about itself.
-        script: its TorchScript archive, without what torch does not need.
+        content: an archive of what computes it: TorchScript without what torch does not need, or
+            ONNX graphs, ``NAME.onnx``.
         is_listed: whether a ``manifest.json`` beside it lists the file as it is.
+        format: of the content.
     """
 
     record: dict[str, Any]
-    script: bytes
+    content: bytes
     is_listed: bool
+    format: ModelFormat
 
 
 def read_model(path: Path) -> ModelFile:
@@ -146,7 +163,11 @@ def read_model(path: Path) -> ModelFile:
         text = archive.read(RECORD_MEMBER, _MAX_RECORD_BYTES)
     record = _parse_record(path, text)
     with translate_damage(path, *_DAMAGED):
-        return ModelFile(record, _checked_script(archive), is_listed)
+        graphs = [name for name in archive.sizes if name.endswith(ModelFormat.ONNX.suffix)]
+        if graphs:
+            content = pack({name: archive.read(name, archive.sizes[name]) for name in graphs})
+            return ModelFile(record, content, is_listed, ModelFormat.ONNX)
+        return ModelFile(record, _checked_script(archive), is_listed, ModelFormat.TORCHSCRIPT)
 
 
 def is_model(path: Path) -> bool:
@@ -199,6 +220,17 @@ def translate_damage(path: Path, text: str, cure: str = "") -> Iterator[None]:
     except Exception as error:  # zipfile, pickletools and torch let many types through
         detail = str(error).partition("\n")[0] or type(error).__name__
         raise ModelError(f"{path}: {text} ({detail}){cure and '; '}{cure}") from error
+
+
+def load_graphs(content: bytes) -> OnnxGraphs:
+    """Load an archive of ONNX graphs that has been checked; ONNX Runtime must be installed.
+
+    Raises:
+        Exception: of many types, for damaged graphs.
+    """
+    archive, suffix = Archive(content), ModelFormat.ONNX.suffix
+    sizes = archive.sizes.items()
+    return OnnxGraphs({name.removesuffix(suffix): archive.read(name, n) for name, n in sizes})
 
 
 def load_script(script: bytes) -> torch.nn.Module:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..common.memory import is_out_of_memory, translate_lack_of_memory
-from ..common.validation import require_torch, truth_value, whole_number
+from ..common.validation import truth_value, whole_number
 from ..errors import ModelError, TaskError, show
 from ..maps.checks import check_grid
 from ..maps.grid_map import GridMap
@@ -21,15 +21,16 @@ from ..networks.config import MAX_IMAGE_SIZE
 from ..robots.poses import position_map, position_of
 from ..robots.robot import Robot
 from ..sampling.bridges import connect
+from ..sampling.guarantee import Guarantee
 from ..sampling.heatmap import Heatmap
 from ..sampling.painted_headings import set_painted_headings
 from .bundled_models import find_model
 from .choice import make_pipeline
-from .convolutions import use_onednn
 from .graphs import TorchGraphs
-from .model_files import load_script, read_model
+from .model_files import read_model
+from .model_loading import RUNTIMES, load_functions, prepare_runtime
+from .onnx_graphs import OnnxGraphs
 from .pipelines import KeptMaps, Painting
-from .probe import Kind, try_model
 from .scaling import scaled_map, scaled_shape
 
 if TYPE_CHECKING:
@@ -59,11 +60,12 @@ def load_model(path: str | PathLike[str] | None = None) -> Predictor:
     one) is tried in another process first, which takes a second, once for each content.
 
     Args:
-        path: a file that ``cbagan-ompl export`` wrote, or the name of a model that comes with the
-            package, such as ``cbagan``, that of the paper; the default model without it.
+        path: a file that ``cbagan-ompl export`` wrote, TorchScript (``.pt``, for torch) or ONNX
+            (``.onnx``, for ONNX Runtime); or the name of a model that comes with the package, such
+            as ``cbagan``, that of the paper; the default model without it.
 
     Raises:
-        MissingDependencyError: torch is not installed.
+        MissingDependencyError: torch, or ONNX Runtime, is not installed.
         ModelError: the file is missing, no exported model, damaged, or of a newer version.
 
     Example:
@@ -74,13 +76,9 @@ def load_model(path: str | PathLike[str] | None = None) -> Predictor:
     """
     source = find_model(path)
     model = read_model(source)  # before torch is loaded, which takes seconds
-    require_torch()
-    if not model.is_listed:
-        try_model(str(source), model.script, Kind.REGION, model.record["working_size"])
+    prepare_runtime(source, model)
     try:
-        module = load_script(model.script)
-        use_onednn(module)
-        predictor = Predictor(module, model.record)
+        predictor = Predictor(load_functions(model), model.record)
         predictor.warm_up()
         prepare_search(with_costs=True)  # for regions that have to be connected
     except ModelError as error:
@@ -91,8 +89,8 @@ def load_model(path: str | PathLike[str] | None = None) -> Predictor:
         if is_out_of_memory(error):
             raise ModelError(f"{source}: not enough memory to load the model") from error
         raise ModelError(
-            f"{source}: torch cannot load the model ({type(error).__name__}), the file is "
-            "probably damaged; copy or export it again"
+            f"{source}: {RUNTIMES[model.format]} cannot load the model ({type(error).__name__}), "
+            "the file is probably damaged; copy or export it again"
         ) from error
     return predictor
 
@@ -101,14 +99,16 @@ class Predictor:
     """An exported model, ready to predict.
 
     Attributes:
-        module: the TorchScript module.
+        module: the TorchScript module, or the ONNX graphs.
         record: what the model file says about itself: ``working_size``, ``metrics``, ``recipe``...
+        guarantee: what is known of the regions that the model predicts, with repair, for maps like
+            those that it was calibrated on; None where it was not. Every such heat map has it.
         inference_threads: CPU threads for one prediction. More than one rarely helps at the
             working size, and takes ten times as long where other work has the cores.
 
     Args:
         module: maps (free, start, goal) to a region probability, see
-            :class:`cbagan_ompl.networks.export_model.RegionModel`.
+            :class:`cbagan_ompl.networks.export_model.RegionModel`; or ONNX graphs.
         record: the record of its file.
 
     Raises:
@@ -122,17 +122,19 @@ class Predictor:
         (256, 256)
     """
 
-    def __init__(self, module: torch.nn.Module, record: dict[str, Any]) -> None:
-        if not callable(module) or not isinstance(record, dict):
+    def __init__(self, module: torch.nn.Module | OnnxGraphs, record: dict[str, Any]) -> None:
+        is_model = isinstance(module, OnnxGraphs) or callable(module)
+        if not is_model or not isinstance(record, dict):
             raise ModelError(
                 f"a Predictor takes a module and its record, got {show(module)} and "
                 f"{show(record)}; load_model makes one from a file"
             )
         whole_number("working_size", record.get("working_size", 0), 1, MAX_IMAGE_SIZE)
-        self.module = module
+        self.module: Any = module
         self.record = record
+        self.guarantee = Guarantee.from_record(record)
         self.inference_threads = 1
-        self._graphs = TorchGraphs(module)
+        self._graphs = module if isinstance(module, OnnxGraphs) else TorchGraphs(module)
         self._pipeline = make_pipeline(self._graphs)
         self._kept: WeakKeyDictionary[GridMap, KeptMaps] = WeakKeyDictionary()
 
@@ -239,7 +241,10 @@ class Predictor:
         heatmaps = [_make_heatmap(painting, i, grid) for i in range(len(tasks))]
         if not repair:
             return heatmaps
-        return [connect(heatmap, pair) for heatmap, pair in zip(heatmaps, pixels, strict=True)]
+        heatmaps = [connect(heatmap, pair) for heatmap, pair in zip(heatmaps, pixels, strict=True)]
+        for heatmap in heatmaps:
+            heatmap.guarantee = self.guarantee
+        return heatmaps
 
     def probabilities(
         self, free: NDArray[np.bool_], start: NDArray[np.floating], goal: NDArray[np.floating]

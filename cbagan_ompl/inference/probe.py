@@ -12,6 +12,7 @@ import resource
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from enum import Enum
 
 from ..errors import ModelError
@@ -38,32 +39,33 @@ class Kind(str, Enum):
     """What a module maps to what."""
 
     REGION = "region"
+    ONNX = "onnx"
     INCEPTION = "inception"
 
 
-def try_model(name: str, script: bytes, kind: Kind, size: int) -> None:
+def try_model(name: str, content: bytes, kind: Kind, size: int) -> None:
     """Load a module and run it once in another process, which takes about a second.
 
     Nothing is done for a content that this process, or the one that started it, has tried before.
 
     Args:
         name: of its file, for the message.
-        script: a TorchScript archive whose members have been checked.
+        content: an archive whose members have been checked: TorchScript or ONNX graphs.
         kind: of its input.
         size: height and width of its input.
 
     Raises:
         ModelError: the process crashed, took too long or too much memory, or raised an error.
     """
-    content = hashlib.sha256(f"{kind.value} {size} ".encode() + script).hexdigest()
+    digest = hashlib.sha256(f"{kind.value} {size} ".encode() + content).hexdigest()
     tried = os.environ.get(_TRIED, "").split()
-    if content in tried:
+    if digest in tried:
         return
     command = [sys.executable, "-I", "-c", _CODE, kind.value, str(size), *sys.path]
     try:
         done = subprocess.run(
             command,
-            input=script,
+            input=content,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             env={**os.environ, "OMP_NUM_THREADS": "1"},
@@ -79,7 +81,7 @@ def try_model(name: str, script: bytes, kind: Kind, size: int) -> None:
             f"that cannot be started ({error})"
         ) from error
     if status == 0:
-        os.environ[_TRIED] = " ".join([*tried, content])
+        os.environ[_TRIED] = " ".join([*tried, digest])
         return
     if -status in (signal.SIGXCPU, signal.SIGKILL):
         reason = f"it takes more than {MAX_SECONDS} s for one prediction"
@@ -88,8 +90,9 @@ def try_model(name: str, script: bytes, kind: Kind, size: int) -> None:
     else:
         reason = said or "the process that tried it gave no reason"
     raise ModelError(
-        f"{name}: torch cannot load the model ({reason}), the file is probably damaged"
-        f"{'; copy or export it again' if kind is Kind.REGION else ''}"
+        f"{name}: {'ONNX Runtime' if kind is Kind.ONNX else 'torch'} cannot load the model "
+        f"({reason}), the file is probably damaged"
+        f"{'' if kind is Kind.INCEPTION else '; copy or export it again'}"
     )
 
 
@@ -100,24 +103,38 @@ def main(kind: str, size: int) -> None:
         kind: see :class:`Kind`.
         size: height and width of its input.
     """
-    import torch
-
-    from .model_files import load_script
-    from .predictor import Predictor
-
-    torch.set_num_threads(1)
-    script = sys.stdin.buffer.read()
-    _limit_resources(MAX_MEMORY + _COPIES * len(script))
+    content = sys.stdin.buffer.read()
+    run = _prepare(Kind(kind), content, size)
+    _limit_resources(MAX_MEMORY + _COPIES * len(content))
     try:
-        module = load_script(script)
-        if kind == Kind.REGION.value:
-            Predictor(module, {"working_size": size}).warm_up()
-        else:
-            with torch.inference_mode():
-                module(torch.zeros(1, 3, size, size, dtype=torch.uint8))
+        run()
     except Exception as error:  # torch raises many types for damaged archives
         print(str(error) if isinstance(error, ModelError) else type(error).__name__)
         sys.exit(1)
+
+
+def _prepare(kind: Kind, content: bytes, size: int) -> Callable[[], object]:
+    """Import what a module needs, and return what loads and runs it."""
+    from .model_files import load_graphs, load_script
+    from .predictor import Predictor
+
+    record = {"working_size": size}
+    if kind is Kind.ONNX:
+        import onnxruntime  # noqa: F401
+
+        return lambda: Predictor(load_graphs(content), record).warm_up()
+    import torch
+
+    torch.set_num_threads(1)
+    if kind is Kind.REGION:
+        return lambda: Predictor(load_script(content), record).warm_up()
+    image = torch.zeros(1, 3, size, size, dtype=torch.uint8)
+
+    def run() -> None:
+        with torch.inference_mode():
+            load_script(content)(image)
+
+    return run
 
 
 def _limit_resources(memory: int) -> None:

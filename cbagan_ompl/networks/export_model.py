@@ -206,8 +206,9 @@ class PatchModel(nn.Module):
         features = self.white_features.repeat(batch * size, 1, 1, 1)
         # The first cell of each window: those around the starts, then those around the goals.
         corners = ((torch.cat((start, goal)) - self.reach) / self.cell).floor()
-        left = corners[:, :1].clamp(0.0, float(width - self.window))
-        top = corners[:, 1:].clamp(0.0, float(height - self.window))
+        corners = corners.clamp(min=0.0)
+        left = torch.minimum(corners[:, :1], torch.full_like(corners[:, :1], width - self.window))
+        top = torch.minimum(corners[:, 1:], torch.full_like(corners[:, 1:], height - self.window))
         shift = self.cell * torch.cat((left, top), 1)
         windows = point_image(start.repeat(2, 1) - shift, goal.repeat(2, 1) - shift, side, side)
         window_features = self.point_stem(tiles_of(windows, self.cell))

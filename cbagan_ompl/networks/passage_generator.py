@@ -201,8 +201,7 @@ class PassageGenerator(nn.Module):
         tiles = painted[..., :16] + self.gain * _label_logit(pixels)
         # What the other nodes of a patch are worse.
         worse = (logits - own) * (codes > 0)
-        if bool((worse < 0).any()):
-            tiles = tiles + self._worse_pixels(worse, codes)
+        tiles = _lower_worse_pixels(tiles, worse, codes)
         batch, height, width = tiles.size(0), tiles.size(1), tiles.size(2)
         tiles = torch.sigmoid(tiles).view(batch, height, width, 4, 4).transpose(2, 3)
         region = tiles.reshape(free.size())
@@ -210,20 +209,27 @@ class PassageGenerator(nn.Module):
         vectors = unit_vectors(vectors) * (distances[:, 1].gather(1, node) < 1e4)
         return (region * free if self.white_obstacles else region), vectors
 
-    def _worse_pixels(self, worse: Tensor, codes: Tensor) -> Tensor:
-        """Return by how much the logit of each pixel is below that of the best node of its patch.
 
-        Args:
-            worse: (B, 4, h, w), of the nodes, above -20.
-            codes: (B, 4, h, w).
+# With its branch also where a model is traced, for ONNX.
+@torch.jit.script_if_tracing  # type: ignore[untyped-decorator]
+def _lower_worse_pixels(logits: Tensor, worse: Tensor, codes: Tensor) -> Tensor:
+    """Return logits, lowered by how much the node of a pixel is below the best of its patch.
 
-        Returns:
-            (B, h, w, 16); that of the best node where a pixel belongs to several, 0 for none.
-        """
-        bits = torch.arange(16, dtype=torch.int32, device=codes.device)
-        members = ((codes.unsqueeze(4) >> bits) & 1).float()
-        best = (members * (worse + 20.0).unsqueeze(4)).amax(1)
-        return torch.where(best > 0, best - 20.0, best)
+    Args:
+        logits: of the pixels, (B, h, w, 16).
+        worse: (B, 4, h, w), by how much nodes are below the best one, from -20 to 0.
+        codes: (B, 4, h, w).
+
+    Returns:
+        (B, h, w, 16); pixels of several nodes have the best of these, others are as they are.
+    """
+    if not bool((worse < 0).any()):
+        return logits
+    # The bits of a code, by arithmetic that ONNX has.
+    powers = torch.pow(2.0, torch.arange(16, device=codes.device).float())
+    members = torch.fmod(torch.floor(codes.float().unsqueeze(4) / powers), 2.0)
+    best = (members * (worse + 20.0).unsqueeze(4)).amax(1)
+    return logits + torch.where(best > 0, best - 20.0, best)
 
 
 @torch.jit.unused

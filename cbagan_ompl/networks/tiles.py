@@ -10,7 +10,10 @@ from torch.nn import functional
 def pad_to_stride(free: Tensor, stride: int) -> Tensor:
     """Return maps with blocked pixels to the right and below, up to multiples of a stride."""
     right, below = -free.size(3) % stride, -free.size(2) % stride
-    return functional.pad(free, [0, right, 0, below]) if right > 0 or below > 0 else free
+    # A graph for ONNX is traced: it has no branches.
+    if torch.jit.is_scripting() and right == 0 and below == 0:  # type: ignore[attr-defined]
+        return free
+    return functional.pad(free, [0, right, 0, below])
 
 
 def tiles_of(images: Tensor, size: int) -> Tensor:

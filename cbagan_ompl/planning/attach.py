@@ -203,7 +203,7 @@ def attach(
     rng = options.generator()
     space = setup.getStateSpace()
     release_forgotten()
-    check_task(setup, heatmap, state_access(space))
+    starts = check_task(setup, heatmap, state_access(space))
     heatmap = with_headings(setup, heatmap, options.heading)
     headings = HeadingSampler(heatmap, options.heading, rng, drives_backwards(space))
     states = state_access(space, headings)
@@ -223,6 +223,8 @@ def attach(
     undo_hook = _INSTALL[hook](_Wiring(setup, planner, name, states, sampler, monitor))
     monitor.register()
     sampler.prepare()
+    if mixture is not None and options.adaptation.connectivity:
+        monitor.prepare(heatmap, starts)
 
     def undo() -> None:
         # First: a planner without samplers makes none while its options change. One that has not

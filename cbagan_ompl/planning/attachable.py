@@ -107,8 +107,8 @@ def planner_of(setup: Any) -> Any:
     return planner
 
 
-def check_task(setup: Any, heatmap: Heatmap, states: StateAccess) -> None:
-    """Raise if the task of a setup cannot be planned for with a heat map.
+def check_task(setup: Any, heatmap: Heatmap, states: StateAccess) -> list[tuple[float, float]]:
+    """Return the positions of the start states, or raise if a heat map cannot serve the task.
 
     Args:
         setup: from :func:`setup_of`, with its planner.
@@ -135,6 +135,7 @@ def check_task(setup: Any, heatmap: Heatmap, states: StateAccess) -> None:
     starts = compat.valid_starts(problem, setup.getSpaceInformation(), states.read)
     if starts and not heatmap.grid.is_free(np.array(starts)).any():
         _raise_frames(starts[0], heatmap)
+    return starts
 
 
 def _raise_frames(start: tuple[float, float], heatmap: Heatmap) -> None:

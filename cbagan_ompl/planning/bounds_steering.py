@@ -106,6 +106,7 @@ class BoundsSteering:
         self._checks_goal_tree = False
         self._is_in_motion = False
         self._passes = False
+        self._has_steered = False  # in this solve
         self._growth = _FirstGrowth(monitor)
         self._handlers: dict[signal.Signals, _RestoringHandler] = {}
 
@@ -224,7 +225,7 @@ class BoundsSteering:
         """Note that some planner begins to solve."""
         self.restore()
         self._true = _copy_bounds(self._space.getBounds())
-        self._nodes_seen, self._passes = 0, False
+        self._nodes_seen, self._passes, self._has_steered = 0, False, False
         self._monitor.check_wiring()
         self._is_ours = self._monitor.has_begun()
         if self._is_ours:
@@ -233,7 +234,7 @@ class BoundsSteering:
             self._growth.begin()
         else:
             self._nodes_before = self._monitor.node_count()
-        self._guard_signals()
+        self.guard_signals()
 
     def _steer(self, caller: FrameType) -> None:
         """Make the next sample one of ours."""
@@ -243,8 +244,10 @@ class BoundsSteering:
         fraction = monitor.injected_fraction
         if fraction < 1 and sampler.chance() >= fraction:
             return
-        monitor.note_call(caller)
-        sampler.begin()
+        if not self._has_steered:
+            self._has_steered = True
+            monitor.note_call(caller)
+            sampler.begin()
         x, y = sampler.next()
         point = self._point
         try:
@@ -258,11 +261,11 @@ class BoundsSteering:
             self.restore()
             raise
 
-    def _guard_signals(self) -> None:
+    def guard_signals(self) -> None:
         """Let handlers of signals that may raise set the bounds back first.
 
         Python runs them before the first line of a callback, where nothing could catch what they
-        raise.
+        raise. Those that were set since the last call are looked after by the next one.
         """
         if threading.current_thread() is not threading.main_thread():
             return

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib.util import find_spec
 from os import PathLike
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -58,8 +57,8 @@ def resolve_auto(
 ) -> tuple[str, ModelOrFile | None]:
     """Return a sampler and its model, with what it stands for on a map in place of :data:`AUTO`.
 
-    That is the corridor on maps up to a size, and where torch is not installed, without the model;
-    else learned.
+    That is the corridor on maps up to a size, and where neither torch nor ONNX Runtime is
+    installed, without the model; else learned.
 
     Args:
         sampler: one of :data:`SAMPLERS`; others than auto are returned as they are.
@@ -72,8 +71,9 @@ def resolve_auto(
     """
     if not (isinstance(sampler, str) and sampler == AUTO):
         return sampler, model
-    is_small = grid.free.size <= _MOST_CORRIDOR_PIXELS
-    if is_small or find_spec("torch") is None:
+    from ..inference.model_loading import can_predict
+
+    if grid.free.size <= _MOST_CORRIDOR_PIXELS or not can_predict():
         return CORRIDOR, None
     return LEARNED, model
 

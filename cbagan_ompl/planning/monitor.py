@@ -6,6 +6,7 @@ import atexit
 import gc
 import sys
 import weakref
+from collections.abc import Sequence
 from math import inf
 from threading import get_ident
 from time import perf_counter
@@ -127,6 +128,16 @@ class PlannerMonitor:
             heatmap.connects(start, goal) for start in endpoints.starts for goal in endpoints.goals
         )
 
+    def prepare(self, heatmap: Heatmap, starts: Sequence[tuple[float, float]]) -> None:
+        """Find out beforehand what :meth:`connects` will ask, where the task is a plain one.
+
+        Args:
+            heatmap: what is sampled.
+            starts: positions of the start states.
+        """
+        if len(starts) == 1 and isinstance(self._goal, ob.GoalState):
+            heatmap.connects(starts[0], self._goals()[0])
+
     def node_count(self) -> int:
         """Return the number of nodes of the tree."""
         return 0 if self._planner is None else int(planner_data(self._planner).numVertices())
@@ -188,14 +199,18 @@ class PlannerMonitor:
         self._cost = self.injected_goal = None
 
     def _endpoints(self) -> InformedSet:
+        starts = [self._states.read(start) for start in start_states(self._planner)]
+        return InformedSet(np.array(starts), np.array(self._goals()), self._goal.getThreshold())
+
+    def _goals(self) -> list[tuple[float, float]]:
+        """Return positions of goal states, sampled from the goal."""
         state = new_state(self._planner.getSpaceInformation().getStateSpace())
         typed = typed_state(state)
         goals = []
         for _ in range(min(self._goal.maxSampleCount(), _MAX_GOALS)):
             self._goal.sampleGoal(typed)
             goals.append(self._states.read(typed))
-        starts = [self._states.read(start) for start in start_states(self._planner)]
-        return InformedSet(np.array(starts), np.array(goals), self._goal.getThreshold())
+        return goals
 
 
 class CostHistory:

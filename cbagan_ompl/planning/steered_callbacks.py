@@ -113,6 +113,7 @@ def install_steering(
     setup.setGoal(steered)
     if was_set_up:
         si.setup()
+    steering.guard_signals()
 
     def undo() -> None:
         steering.release()

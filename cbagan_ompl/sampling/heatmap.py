@@ -20,6 +20,7 @@ from ..robots.poses import position_map, position_of
 from ..robots.robot import Robot
 from .bands import half_width, paint_band
 from .bridges import connect
+from .guarantee import Guarantee
 from .headings import check_headings, descend, look_up, sample_headings
 from .heatmap_files import read_heatmap_values
 from .heatmap_values import to_unit_range
@@ -45,6 +46,7 @@ class Heatmap:
         grid: the map that the values lie on.
         heading: float32, shape (H, W): the direction of travel in each pixel, world radians in
             [-pi, pi], NaN where unknown; or None where nothing is known.
+        guarantee: what is known of the pixels from a threshold on; None where nothing is.
 
     Args:
         values: any real array of the grid's shape. Unsigned integers are scaled from their full
@@ -91,7 +93,9 @@ class Heatmap:
         self.values: NDArray[np.float32] = scaled
         self.grid = grid
         self.heading = None if heading is None else check_headings(heading, grid)
+        self.guarantee: Guarantee | None = None
         self._support = support
+        self._last_connected: tuple[object, bool] = None, False  # a pair of pixels, the answer
 
     @classmethod
     def load(cls, path: str | PathLike[str], grid: GridMap) -> Heatmap:
@@ -213,7 +217,9 @@ class Heatmap:
         if not self.grid.is_free(endpoints).all():
             return False
         pixels = pixel_pair(self.grid.to_pixel(endpoints))
-        return in_one_component(self.region, *pixels, connectivity=4)
+        if self._last_connected[0] != pixels:
+            self._last_connected = pixels, in_one_component(self.region, *pixels, connectivity=4)
+        return self._last_connected[1]
 
     def connected(self, start: ArrayLike, goal: ArrayLike) -> Heatmap:
         """Return this heat map with a region that connects start and goal.

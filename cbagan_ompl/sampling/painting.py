@@ -38,6 +38,7 @@ def paint_heatmap(values: NDArray[np.float32], grid: GridMap, least: float) -> H
     # All that Heatmap() would check is known: it reads every pixel.
     heatmap = Heatmap.__new__(Heatmap)
     heatmap.values, heatmap.grid, heatmap.heading = result, grid, None
+    heatmap.guarantee = None
     heatmap._support = indices[:count].copy()
     return heatmap
 

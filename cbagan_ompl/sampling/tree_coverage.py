@@ -55,8 +55,9 @@ class TreeCoverage:
 
     def clear(self) -> None:
         """Forget all nodes."""
-        self.node_count = 0
-        self._pixels[:] = 0
+        if self.node_count:
+            self.node_count = 0
+            self._pixels[:] = 0
 
     def _pixel_of(self, x: float, y: float) -> tuple[int, int]:
         a, b, c, d, e, f = self._affine

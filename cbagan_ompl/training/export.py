@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import datetime
 import hashlib
+import io
 import json
+import zipfile
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -17,15 +19,21 @@ from ..common.outputs import check_output
 from ..errors import ModelError, show
 from ..inference.model_files import (
     MANIFEST,
+    MAX_MODEL_BYTES,
     MAX_NAME_LENGTH,
+    RECORD_MEMBER,
     RECORD_SCHEMA,
+    ModelFormat,
     is_model,
     read_manifest,
     read_record,
 )
 from ..networks.export_model import AnyGenerator, make_region_model
+from ..sampling.guarantee import RECORD_KEY, Guarantee
+from .cards import MAX_CARD_BYTES, is_card, model_card, with_guarantee
 from .checkpoints import best_generator, load_checkpoint
 from .model_weights import recover_generator
+from .onnx_export import save_onnx
 from .torchscript import save_script
 
 INPUTS = (
@@ -36,13 +44,6 @@ INPUTS = (
 OUTPUTS = "float (B, 1, H, W) in [0, 1]: probability that a pixel belongs to the promising region"
 
 
-# In every card, by which it is known as one.
-_CARD_LINE = (
-    "Predicts, for a 2-D occupancy map with a start and a goal, the region that good paths probably"
-)
-_MAX_CARD_BYTES = 2**20
-
-
 def export(
     checkpoint: str | PathLike[str],
     path: str | PathLike[str],
@@ -50,7 +51,7 @@ def export(
     note: str = "",
     force: bool = False,
 ) -> dict[str, Any]:
-    """Write the generator of a checkpoint as a TorchScript file with its record.
+    """Write the generator of a checkpoint with its record, as TorchScript or as ONNX.
 
     Beside the file go a model card (the same name with suffix ``.md``) and its line in
     ``manifest.json``, which names the default model and the SHA-256 of each.
@@ -58,7 +59,8 @@ def export(
     Args:
         checkpoint: a file that :func:`cbagan_ompl.training.loop.train` wrote; or an exported model,
             whose weights are recovered, to write it in the form of this version.
-        path: the file to write; its suffix is ``.pt``.
+        path: the file to write; its suffix is ``.pt`` for TorchScript, which torch computes, or
+            ``.onnx`` for ONNX graphs, which ONNX Runtime does.
         note: what the checkpoint cannot tell, for the record and the card: the origin of the data,
             and the licences of data and model.
         force: write over files of these names that no export wrote.
@@ -71,8 +73,9 @@ def export(
             or a name that is too long or not printable; or a file would be lost.
     """
     target = as_path(path, ModelError)
-    if target.suffix != ".pt":
-        raise ModelError(f"{target}: the name of an exported model ends in .pt")
+    formats = {kind.suffix: kind for kind in ModelFormat}
+    if target.suffix not in formats:
+        raise ModelError(f"{target}: the name of an exported model ends in {' or '.join(formats)}")
     if not target.stem.isprintable() or len(target.stem) > MAX_NAME_LENGTH:
         raise ModelError(
             f"a model cannot be called {show(target.stem)}: its name is printable and has at most "
@@ -81,12 +84,48 @@ def export(
     generator, record = _read_source(Path(checkpoint), target.stem, note)
     make_folder(target.parent, ModelError)
     _check_outputs(target, as_path(checkpoint), force)
-    model = make_region_model(generator)
-    # Convolutions in this layout take four fifths of the time on a CPU.
-    model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
-    save_script(model, target, record)
-    write_atomically(target.with_suffix(".md"), model_card(record), ModelError)
+    model, card = make_region_model(generator), target.with_suffix(".md")
+    is_onnx = formats[target.suffix] is ModelFormat.ONNX
+    if is_onnx:
+        save_onnx(model, target, record)
+    else:
+        # Convolutions in this layout take four fifths of the time on a CPU.
+        model.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        save_script(model, target, record)
+    # Both formats of a model have one card.
+    if not (is_onnx and is_card(card)):
+        write_atomically(card, model_card(record), ModelError)
     _update_manifest(target, force)
+    return record
+
+
+def add_guarantee(path: str | PathLike[str], guarantee: Guarantee) -> dict[str, Any]:
+    """Write a guarantee into the record of an exported model, its card and the manifest beside it.
+
+    Args:
+        path: of the model; nothing but its record changes.
+        guarantee: from a calibration.
+
+    Returns:
+        The record.
+
+    Raises:
+        ModelError: the file is no exported model, or cannot be written.
+    """
+    target = as_path(path, ModelError)
+    record = read_record(target) | {RECORD_KEY: guarantee.to_record()}
+    source, buffer = read_bytes(target, ModelError, MAX_MODEL_BYTES), io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(source)) as old, zipfile.ZipFile(buffer, "w") as new:
+        for member in old.infolist():
+            is_record = member.filename.partition("/")[2] == RECORD_MEMBER
+            content = json.dumps(record, indent=1).encode() if is_record else old.read(member)
+            new.writestr(zipfile.ZipInfo(member.filename), content)
+    write_atomically(target, buffer.getvalue(), ModelError)
+    card = target.with_suffix(".md")
+    if is_card(card):
+        text = with_guarantee(read_text(card, ModelError, MAX_CARD_BYTES), record)
+        write_atomically(card, text, ModelError)
+    _update_manifest(target, force=False)
     return record
 
 
@@ -117,7 +156,7 @@ def _check_outputs(model: Path, checkpoint: Path, force: bool) -> None:
     """Raise if a file would be overwritten that is an input, or that no export wrote."""
     for path, is_ours in (
         (model, is_model),
-        (model.with_suffix(".md"), _is_card),
+        (model.with_suffix(".md"), is_card),
         (model.parent / MANIFEST, _is_manifest),
     ):
         check_output(str(path), [checkpoint], force=True)
@@ -126,13 +165,6 @@ def _check_outputs(model: Path, checkpoint: Path, force: bool) -> None:
                 f"{path} exists, and `cbagan-ompl export` did not write it; choose another "
                 "--output, or overwrite it with --force"
             )
-
-
-def _is_card(path: Path) -> bool:
-    try:
-        return _CARD_LINE in " ".join(read_text(path, ModelError, _MAX_CARD_BYTES).split())
-    except ModelError:
-        return False
 
 
 def _is_manifest(path: Path) -> bool:
@@ -173,98 +205,6 @@ def make_record(
         },
         **_origin(),
     }
-
-
-def model_card(record: dict[str, Any]) -> str:
-    """Return the record as Markdown, for people."""
-    dataset, metrics = record["dataset"], record["metrics"]
-    split = "test" if metrics["test"] else "validation"
-    rows = {
-        "this model": metrics[split],
-        **((metrics["trivial"] if split == "test" else None) or {}),
-    }
-    columns = ("iou", "dice", "precision", "recall", "connectivity")
-    table = "\n".join(
-        f"| {name} | " + " | ".join(f"{scores[column]:.3f}" for column in columns) + " |"
-        for name, scores in rows.items()
-    )
-    recipe = "\n".join(f"- `{name}`: {value}" for name, value in record["recipe"].items())
-    return f"""# {record["name"]}
-
-Predicts, for a 2-D occupancy map with a start and a goal, the region that good paths probably run
-through: the generator of {_describe_network(record["recipe"])},
-{_describe_training(record["recipe"])}, exported as
-TorchScript on {record["date"]} with torch {record["torch"]}.
-
-- Input: {record["inputs"]}
-- Output: {record["outputs"]}
-- Parameters: {record["parameters"]:,}
-- Maps are scaled to {record["working_size"]} pixels on the longer side, the size of the training
-  images; small ones are enlarged to twice their size at most.
-
-## Data
-
-{_describe_data(dataset)}
-
-{record["note"] or "Licence and origin of the data: not stated."}
-
-## Scores
-
-Of the region class alone, over all pixels of the {split} tasks; connectivity is the fraction of
-tasks whose start and goal one 8-connected part of the region in free space connects.
-
-| predictor | {" | ".join(columns)} |
-|---|{"---|" * len(columns)}
-{table}
-
-## Limits
-
-The scores hold for maps like those of the training set. On other maps the region is a guess that
-may miss the path, so samplers keep a fraction of uniform samples, and a planner's guarantees rest
-on that fraction. The region says nothing of a robot's shape or dynamics.
-
-## Recipe
-
-Epoch {record["epoch"]} of:
-
-{recipe}
-"""
-
-
-def _describe_data(dataset: dict[str, Any]) -> str:
-    side = dataset["side"]
-    if "synthetic" not in dataset:
-        return (
-            f"`{dataset['name']}`: {dataset['maps']} maps of {side} x {side} pixels,\n"
-            f"{dataset['train_tasks']} tasks for training and validation, "
-            f"{dataset['test_tasks']} for testing."
-        )
-    settings = dataset["synthetic"]
-    return (
-        f"Synthetic maps, generated during the training (`cbagan-ompl train --synthetic`, seed "
-        f"{settings['seed']}):\n"
-        f"{dataset['maps']} new maps of {side} x {side} pixels in each epoch with "
-        f"{dataset['train_tasks']} tasks, {settings['hard_fraction']:.0%} of them\n"
-        f"hard; {dataset['test_tasks']} tasks on other maps for testing. The label of a pixel "
-        "falls with the detour\nthat a path through it takes, to 0.5 at "
-        f"{settings['label']['epsilon']:.0%} and {settings['label']['slack']:g} pixel. "
-        f"Generators: {', '.join(settings['generators'])}."
-    )
-
-
-def _describe_network(recipe: dict[str, Any]) -> str:
-    kinds = [name for name in ("channel", "spatial", "self") if recipe.get(f"{name}_attention")]
-    if kinds == ["self"]:
-        return "a GAN with self-attention (SAGAN)"
-    if kinds == ["channel", "spatial"]:
-        return "a convolutional block attention GAN (CBAGAN-RRT)"
-    return f"a GAN with {' and '.join(kinds) or 'no'} attention"
-
-
-def _describe_training(recipe: dict[str, Any]) -> str:
-    if not recipe.get("adversarial_weight"):
-        return "trained for segmentation alone, without discriminators"
-    return "trained against a map and a point discriminator"
 
 
 def _update_manifest(model: Path, force: bool) -> None:

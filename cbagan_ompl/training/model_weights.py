@@ -23,7 +23,7 @@ from torch.nn.utils.fusion import fuse_conv_bn_weights
 from ..datasets.dataset import Tasks
 from ..errors import ModelError
 from ..inference.bundled_models import find_model
-from ..inference.model_files import is_model, load_script
+from ..inference.model_files import ModelFormat, is_model, load_script, read_model
 from ..inference.predictor import load_model
 from ..networks.config import NetworkConfig
 from ..networks.export_model import (
@@ -80,6 +80,8 @@ def recover_generator(path: Path) -> AnyGenerator:
     Raises:
         ModelError: the file cannot be read, or holds no generator of this version's architecture.
     """
+    if read_model(Path(path)).format is ModelFormat.ONNX:
+        raise ModelError(f"{path}: weights are recovered from TorchScript files (.pt) alone")
     model = load_model(path)
     generator = make_generator(_architecture(model.record)).eval()
     try:

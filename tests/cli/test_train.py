@@ -55,6 +55,9 @@ def test_train_and_export_commands(
     words = ["export", str(tmp_path / "run/best.pt"), "--output", str(tmp_path / "tiny.pt")]
     assert run(*words) == 0
     assert {"tiny.pt", "tiny.md", "manifest.json"} <= {p.name for p in tmp_path.iterdir()}
+    capsys.readouterr()
+    with pytest.raises(ConfigError, match=r"--format onnx writes a file .* ends in \.onnx"):
+        run(*words, "--format", "onnx")
 
 
 @pytest.mark.parametrize("kept", [False, True])

@@ -16,8 +16,9 @@ from cbagan_ompl import ConfigError, GridMap, ModelError
 from cbagan_ompl.inference import model_files
 from cbagan_ompl.inference.predictor import load_model
 from cbagan_ompl.networks.export_model import RegionModel
+from cbagan_ompl.training.cards import is_card, model_card
 from cbagan_ompl.training.checkpoints import best_generator, load_checkpoint
-from cbagan_ompl.training.export import _is_card, export, model_card
+from cbagan_ompl.training.export import export
 from cbagan_ompl.training.loop import train
 from cbagan_ompl.training.task_sources import DatasetSource
 
@@ -152,4 +153,4 @@ def test_names_that_a_model_cannot_have(checkpoint: Path, tmp_path: Path, stem: 
 def test_cards_of_the_repository_are_known_as_cards() -> None:
     cards = sorted((Path(__file__).parents[2] / "models").glob("*.md"))
     assert cards
-    assert all(map(_is_card, cards))
+    assert all(map(is_card, cards))
