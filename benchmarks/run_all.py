@@ -32,6 +32,8 @@ from cbagan_ompl.common.files import write_json
 ROOT = Path(__file__).resolve().parents[1]
 STUDIES = ROOT / "benchmarks" / "studies"
 SUITES = ROOT / "benchmarks" / "suites"
+# The data, which are not part of the repository.
+FOLDERS = ("maps", "suites", "dataset")
 # What the tables do not need of a summary.
 _UNUSED = ("families", "hosts")
 
@@ -64,6 +66,11 @@ def study(name: str, script: str, *words: str, both: bool = True) -> Step:
     return Step(name, (str(STUDIES / script), *words, "--json", "{json}"), both)
 
 
+# What meets heat maps that are wrong on purpose, by the version of OMPL.
+WRONG = {
+    "2.0.1": "RRTConnect,RRT,RRTstar,InformedRRTstar,BKPIECE1",
+    "1.7.0": "RRTConnect,RRT,LazyPRM,SST,KPIECE1,TRRT,BiEST",
+}
 REAL_MAPS = ("{maps}/png/*.png", "--tasks", "{maps}/tasks.csv")
 STEPS = (
     suite("real_maps", "real_maps", *REAL_MAPS),
@@ -81,6 +88,11 @@ STEPS = (
     suite("nav2_maps", "nav2_maps", "{suites}/nav2/*.yaml"),
     study("rrtconnect", "rrtconnect.py", *REAL_MAPS, "--runs", "3"),
     study("unseen_maps", "unseen_maps.py", *REAL_MAPS, "--runs", "3"),
+    study(
+        "wrong_heatmaps",
+        "wrong_heatmaps.py",
+        *("--planners", "{planners}", "--runs", "15", "--time", "3", "--most", "15000"),
+    ),
     study("replanning_bundled", "replanning.py", both=False),
     study("replanning_real_maps", "replanning.py", *REAL_MAPS, "--tasks-per-map", "3", both=False),
     Step(
@@ -94,7 +106,7 @@ STEPS = (
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    for name in ("maps", "suites", "dataset"):
+    for name in FOLDERS:
         parser.add_argument(f"--{name}", type=Path, default=Path(name.upper()), metavar="DIR")
     parser.add_argument("--output", type=Path, required=True, metavar="DIR")
     parser.add_argument("--other-python", metavar="FILE", help="Python with the other OMPL")
@@ -103,7 +115,7 @@ def main() -> None:
     parser.add_argument("--list", action="store_true", help="print the commands, run nothing")
     args = parser.parse_args()
     args.output.mkdir(parents=True, exist_ok=True)
-    places = {name: str(getattr(args, name)) for name in ("maps", "suites", "dataset")}
+    places = {name: str(getattr(args, name)) for name in FOLDERS}
     jobs = [] if args.jobs is None else ["--jobs", args.jobs]
     pythons = {
         version_of(python): python for python in (sys.executable, args.other_python) if python
@@ -111,6 +123,7 @@ def main() -> None:
     failed = []
     for version, python, step in steps_of(pythons, args.only):
         name = f"{step.name}_ompl_{version}" if step.both else step.name
+        places["planners"] = WRONG.get(version, "RRT")
         if args.list:
             print(shlex.join(command(step, python, places, args.output, name, jobs)))
         elif not (args.output / f"{name}.json").exists():
@@ -170,7 +183,8 @@ def run(
         status = subprocess.run(words, stdout=log, stderr=log, env=environment).returncode
     if status == 0 and step.is_benchmark:
         text = (output / "work" / name / "summary.json").read_text()
-        for folder, path in {**places, "output": str(output), "root": str(ROOT)}.items():
+        folders = {name: places[name] for name in FOLDERS}
+        for folder, path in {**folders, "output": str(output), "root": str(ROOT)}.items():
             text = text.replace(path, folder.upper())
         summary = json.loads(text)
         for key in _UNUSED:

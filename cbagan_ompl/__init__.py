@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from .maps.loading import bundled_maps
     from .maps.tasks import Task, load_tasks, tasks_of
     from .planning.attach import Attachment, attach
-    from .planning.hooks import reached_planners
+    from .planning.hooks import reached_control_planners, reached_planners
     from .planning.ompl_samplers import (
         HeatmapStateSampler,
         HeatmapValidStateSampler,
@@ -88,6 +88,7 @@ __all__ = [
     "load_model",
     "load_tasks",
     "plan",
+    "reached_control_planners",
     "reached_planners",
     "save_figure",
     "state_sampler_allocator",
@@ -101,7 +102,7 @@ _HOMES = {
     "maps.loading": ("bundled_maps",),
     "maps.tasks": ("Task", "load_tasks", "tasks_of"),
     "planning.attach": ("Attachment", "attach"),
-    "planning.hooks": ("reached_planners",),
+    "planning.hooks": ("reached_control_planners", "reached_planners"),
     "planning.plan": ("plan",),
     "planning.plan_result": ("PlanResult",),
     "planning.replanner": ("Replanner",),

@@ -101,6 +101,18 @@ def wrong_heatmaps() -> str:
     return table(["heat map", *header], lines)
 
 
+def wrong_heatmaps_by_planner() -> str:
+    rows = []
+    for version in VERSIONS:
+        for planner, heatmaps in read(f"wrong_heatmaps_ompl_{version}.json")["planners"].items():
+            slowest = max(heatmaps, key=lambda name: heatmaps[name]["effort_ratio"])
+            losing = min(heatmaps, key=lambda name: heatmaps[name]["solved"])
+            effort, row = heatmaps[slowest]["effort_ratio"], heatmaps[losing]
+            solved = f"{row['uniform_solved']:.0%} / {row['solved']:.0%}"
+            rows.append([version, planner, f"{effort:.2f}", slowest, solved])
+    return table(["OMPL", "planner", "effort", "with", "solved: own / worst"], rows)
+
+
 def labels() -> str:
     planners = ("RRT", "RRTstar", "InformedRRTstar")
     header = ["label", "RRT: nodes", "RRTstar: to 5 %", "InformedRRTstar: to 5 %", "time for one"]
@@ -276,6 +288,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "rrtconnect": rrtconnect,
     "overhead": overhead,
     "wrong_heatmaps": wrong_heatmaps,
+    "wrong_heatmaps_by_planner": wrong_heatmaps_by_planner,
     "sharpness": sharpness,
     "labels": labels,
     "ablation": ablation,

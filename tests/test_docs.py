@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 import cbagan_ompl
-from cbagan_ompl import reached_planners
+from cbagan_ompl import reached_control_planners, reached_planners
 from cbagan_ompl.cli import main
 from cbagan_ompl.planning.compat import HAS_STATE_SAMPLER_ALLOCATOR
 
@@ -148,12 +148,12 @@ def test_table_of_hooks() -> None:
     page = (DOCS / "planners.md").read_text(encoding="utf-8")
     section = page.split("## Which planner is reached how")[1].split("\n## ")[0]
     hooks = {}
-    for row in re.findall(r"^\| ([\w*, ]+) \| ([^|]+) \| ([^|]+) \|$", section, re.MULTILINE):
-        hook = row[column].replace(" sampler", "-sampler").replace(" ", "-")
+    for row in re.findall(r"^\| ([\w*., ]+) \| ([^|]+) \| ([^|]+) \|$", section, re.MULTILINE):
+        hook = row[column].split(",")[0].replace(" sampler", "-sampler").replace(" ", "-")
         for name in row[0].split(", "):
             hooks[name.replace("*", "star").replace(" ", "")] = hook
     reached = {n: h for n, h in hooks.items() if h.endswith(("sampler", "injection", "steering"))}
-    assert reached == reached_planners()
+    assert reached == reached_planners() | reached_control_planners()
 
 
 def test_figures_of_replanning_are_those_of_the_result_files() -> None:

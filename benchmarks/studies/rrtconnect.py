@@ -27,7 +27,7 @@ from ompl import util as ou
 from tqdm import tqdm
 
 from cbagan_ompl import GridMap, Heatmap, attach, load_model
-from cbagan_ompl.benchmarking.statistics import ratio_interval
+from cbagan_ompl.benchmarking.intervals import ratio_interval
 from cbagan_ompl.benchmarking.tasks import BenchmarkTask, select_tasks
 from cbagan_ompl.common.files import write_json
 from cbagan_ompl.datasets.geodesic import distance_field

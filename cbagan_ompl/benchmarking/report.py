@@ -9,9 +9,10 @@ from typing import Any
 
 from ..common.markdown import table
 from ..common.text import one_line
+from .intervals import Interval
 from .logs import HOSTS
 from .settings import BASELINE, Settings
-from .statistics import Interval, Results, Summary, nodes_key, within_key
+from .statistics import Results, Summary, nodes_key, within_key
 
 # Tasks left out that the report names.
 _SHOWN_LEFT_OUT = 10

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
+from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .intervals import Interval, Medians
 from .logs import GEOMETRIC, ExperimentLog, number
 from .measures import (
     BEST_KNOWN,
@@ -27,24 +29,6 @@ from .measures import (
     time_within,
 )
 from .settings import BASELINE
-
-_RESAMPLES = 2000
-_TAILS = (0.025, 0.975)
-
-
-@dataclass(frozen=True)
-class Interval:
-    """A median over tasks with its bootstrap 95 % interval; infinite where most runs are unsolved.
-
-    Attributes:
-        median: median over the tasks of the medians over the runs.
-        low: lower end of the interval.
-        high: upper end of the interval.
-    """
-
-    median: float
-    low: float
-    high: float
 
 
 @dataclass(frozen=True)
@@ -229,8 +213,13 @@ def summarize(
         }
         for key, tasks in rows.items()
     }
+    baselines = {
+        planner: _medians_of((planner, sampler), values[planner, sampler])
+        for planner, sampler in rows
+        if sampler == BASELINE
+    }
     return [
-        _summary(key, values[key], values.get((key[0], BASELINE)), _solved(tasks))
+        _summary(key, values[key], baselines.get(key[0]), _solved(tasks))
         for key, tasks in rows.items()
     ]
 
@@ -242,14 +231,14 @@ def _solved(tasks: Sequence[_TaskRuns]) -> list[bool]:
 def _summary(
     key: tuple[str, str],
     values: Mapping[str, list[NDArray[np.float64]]],
-    baseline: Mapping[str, list[NDArray[np.float64]]] | None,
+    baseline: Mapping[str, Medians] | None,
     solved: Sequence[bool],
 ) -> Summary:
-    medians = {name: [task[:, 0] for task in tasks] for name, tasks in values.items()}
+    medians = _medians_of(key, values)
     ratios = {}
     if baseline is not None and key[1] != BASELINE:
         ratios = {
-            name: ratio_interval(runs, [task[:, 0] for task in baseline[name]])
+            name: runs.over(baseline[name]).interval()
             for name, runs in medians.items()
             if name not in _NO_RATIO
         }
@@ -259,77 +248,17 @@ def _summary(
         tasks=len(next(iter(values.values()))),
         runs=len(solved),
         success=float(np.mean(solved)),
-        measures={name: median_interval(runs) for name, runs in medians.items()},
+        measures={name: runs.interval() for name, runs in medians.items()},
         censored={name: float(np.concatenate(v)[:, 1].mean()) for name, v in values.items()},
         ratios=ratios,
     )
 
 
-def median_interval(tasks: Sequence[NDArray[np.float64]]) -> Interval:
-    """Return the median over tasks of the medians over runs.
-
-    The bootstrap resamples the tasks, and the runs of each task, so that the interval covers both
-    the choice of the tasks and the chance in the runs. It is the percentile bootstrap of `Efron and
-    Tibshirani, An Introduction to the Bootstrap (1993)
-    <https://doi.org/10.1201/9780429246593>`_, in two stages.
-
-    Args:
-        tasks: for each task the values of its runs, shape (R,); infinite ones are allowed.
-    """
-    rng = np.random.default_rng(0)
-    medians = np.array([np.median(runs) for runs in tasks])
-    return _interval(medians, np.array([_resample_medians(runs, rng) for runs in tasks]), rng)
-
-
-def ratio_interval(
-    tasks: Sequence[NDArray[np.float64]], baseline: Sequence[NDArray[np.float64]]
-) -> Interval:
-    """Return the median over tasks of the ratio of the medians over runs.
-
-    Args:
-        tasks: as for :func:`median_interval`.
-        baseline: the divisor: the values of the baseline, for the same tasks.
-    """
-    rng = np.random.default_rng(0)
-    medians = (np.array([np.median(runs) for runs in values]) for values in (tasks, baseline))
-    resampled = (
-        np.array([_resample_medians(runs, rng) for runs in values]) for values in (tasks, baseline)
-    )
-    return _interval(ratio(*medians), ratio(*resampled), rng)
-
-
-def ratio(values: NDArray[np.float64], baseline: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return quotients; two equal values have the ratio 1, also where both are infinite.
-
-    Args:
-        values: the dividends, of any shape, in any unit.
-        baseline: the divisors, of the same shape and unit.
-    """
-    ones: NDArray[np.float64] = np.ones(values.shape)
-    with np.errstate(divide="ignore"):
-        return np.divide(values, baseline, out=ones, where=values != baseline)
-
-
-def _resample_medians(runs: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
-    """Return medians of the runs on a task, resampled with replacement, shape (B,)."""
-    samples = runs[rng.integers(len(runs), size=(_RESAMPLES, len(runs)))]
-    medians: NDArray[np.float64] = np.median(samples, axis=1)
-    return medians
-
-
-def _interval(
-    medians: NDArray[np.float64], resampled: NDArray[np.float64], rng: np.random.Generator
-) -> Interval:
-    """Return the interval of a median over tasks.
-
-    Args:
-        medians: of each task, shape (T,).
-        resampled: the resampled medians of each task, shape (T, B).
-        rng: chooses the tasks.
-    """
-    tasks, resamples = resampled.shape
-    chosen = rng.integers(tasks, size=(tasks, resamples))
-    spread = np.median(resampled[chosen, np.arange(resamples)], axis=0)
-    # Quantiles that are values of the sample, because there is nothing between infinite ones.
-    low, high = np.quantile(spread, _TAILS, method="inverted_cdf")
-    return Interval(float(np.median(medians)), float(low), float(high))
+def _medians_of(
+    key: tuple[str, str], values: Mapping[str, list[NDArray[np.float64]]]
+) -> dict[str, Medians]:
+    """Return the medians of each measure, resampled with a seed of the row's own."""
+    seed = crc32("_".join(key).encode())
+    return {
+        name: Medians.of([task[:, 0] for task in tasks], seed) for name, tasks in values.items()
+    }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import TracebackType
 from typing import Any
 
@@ -22,33 +22,32 @@ from ..sampling.heatmap import Heatmap
 from ..sampling.options import OPTIMIZING_SHARPNESS, SamplerOptions
 from ..sampling.roadmap import RoadmapMixture
 from ..sampling.sampler import HeatmapSampler
-from . import compat, ompl_samplers
-from .attachable import check_task, planner_of, setup_of
+from . import compat
+from .attachable import check_task, planner_of, setup_of, warn_of_single_controls
 from .bounds_steering import SteeringMonitor
-from .compat import ou
-from .goal_injection import InjectedGoal
-from .goal_monitor import GoalMonitor, goal_monitor
+from .goal_monitor import goal_monitor
 from .hooks import (
     BOUNDS_STEERING,
     GOAL_INJECTION,
-    STATE_SAMPLER,
-    VALID_STATE_SAMPLER,
-    class_name,
     hook_of,
-    keeps_sampler,
+    needs_directed_controls,
     samples_are_nodes,
     stops_at_first,
     wants_sharp,
 )
-from .monitor import PlannerMonitor, is_informed, release_forgotten
+from .installation import Wiring, install
+from .monitor import PlannerMonitor, release_forgotten
+from .planner_kinds import class_name, plans_controls
 from .pose_headings import with_headings
-from .states import StateAccess, drives_backwards, position_bounds, state_access
-from .steered_callbacks import install_steering
+from .states import drives_backwards, position_bounds, state_access
 
 # OMPL's range of a planner that was given none, as a fraction of the extent of the space.
 _OMPL_RANGE = 0.2
 # How far around a node its tree is taken to be, as a fraction of the range.
 _REACH = 0.8
+
+# The hooks whose callbacks see the planner's tree, each with what watches it.
+_MONITORS = {GOAL_INJECTION: goal_monitor, BOUNDS_STEERING: SteeringMonitor}
 
 
 class Attachment:
@@ -151,9 +150,9 @@ def attach(
     attachment, only ``detach`` lets go of them.
 
     Args:
-        setup: an ``ompl.geometric.SimpleSetup``, or a geometric planner with its problem
-            definition, where there is no setup. The solves of such a planner are not watched on
-            OMPL 2.0: a goal that is replaced while it is attached is not noticed there.
+        setup: a ``SimpleSetup`` of ``ompl.geometric`` or ``ompl.control``, or a planner with its
+            problem definition, where there is no setup. The solves of such a planner are not
+            watched on OMPL 2.0: a goal that is replaced while it is attached is not noticed there.
         heatmap: what to sample, in the coordinates of the setup's space. Where states have a yaw
             and the heat map no headings, those of :meth:`.Heatmap.directed` to the goal are taken.
         options: how samples follow the heat map. ``sharpness`` None stands for 1 with planners that
@@ -166,10 +165,14 @@ def attach(
     Returns:
         A handle with ``.hook``, ``.sample_counts`` and ``.detach()``.
 
+    Warns:
+        CbaganOmplWarning: a control planner tries one control for each sample, so that samples make
+            no difference to it.
+
     Raises:
         PlannerError: ``setup`` is neither, no planner is set, no hook of this build reaches it, it
-            is written in Python or plans controls, it samples a heat map already, its space has no
-            (x, y), the start or goal is missing, or the goal cannot be sampled.
+            is written in Python, it samples a heat map already, its space has no (x, y), the start
+            or goal is missing, or the goal cannot be sampled.
         TaskError: the start is outside or in an obstacle of the heat map's map.
         HeatmapError: not a :class:`Heatmap`, or one that is 0 everywhere in the bounds of the
             space.
@@ -197,6 +200,8 @@ def attach(
     planner = planner_of(setup)
     name = class_name(planner)
     hook = hook_of(name)
+    if needs_directed_controls(name):
+        warn_of_single_controls(planner)
     if options.sharpness is None:
         sharpness = OPTIMIZING_SHARPNESS if wants_sharp(name) else 1.0
         options = replace(options, sharpness=sharpness)
@@ -218,9 +223,9 @@ def attach(
     sampler = HeatmapSampler(heatmap, replace(options, seed=rng), monitor, mixture, budget)
     sampler.keep_inside(*position_bounds(space))
     # Samplers and solutions that are there already would keep the planner from asking for samples.
-    planner.clear()
+    compat.clear_planner(planner)
     setup.getProblemDefinition().clearSolutionPaths()
-    undo_hook = _INSTALL[hook](_Wiring(setup, planner, name, states, sampler, monitor))
+    undo_hook = install(hook, Wiring(setup, planner, name, states, sampler, monitor))
     monitor.register()
     sampler.prepare()
     if mixture is not None and options.adaptation.connectivity:
@@ -238,7 +243,12 @@ def attach(
 
 
 def _reach_of(planner: Any) -> float:
-    """Return how far around a node a tree need not grow again, world units: most of its range."""
+    """Return how far around a node a tree need not grow again, world units: most of its range.
+
+    Where controls are planned it is 0: what is near in position may be far on the way.
+    """
+    if plans_controls(planner):
+        return 0.0
     # Before its setup a planner may have no range yet; OMPL then takes a fraction of the space.
     si = planner.getSpaceInformation()
     range = planner.getRange() if hasattr(planner, "getRange") else 0.0
@@ -251,93 +261,3 @@ def _budget_of(planner: Any, name: str, hook: str) -> LearnedBudget:
     if stops_at_first(name) or hasattr(planner, "bestCost"):
         return LearnedBudget()
     return LearnedBudget(EARNED_BY_UNIFORM_UNSEEN, is_halved=False)
-
-
-@dataclass(frozen=True)
-class _Wiring:
-    """What the installation of a hook works with."""
-
-    setup: Any
-    planner: Any
-    name: str
-    states: StateAccess
-    sampler: HeatmapSampler
-    monitor: PlannerMonitor
-
-
-def _use_state_sampler(wiring: _Wiring) -> Callable[[], None]:
-    space, planner = wiring.setup.getStateSpace(), wiring.planner
-    space.setStateSamplerAllocator(ompl_samplers.state_sampler_allocator(wiring.sampler))
-    restore = _reject_uninformed(planner) if is_informed(planner) else None
-    keeps = keeps_sampler(wiring.name)
-    if keeps:
-        _renew_sampler(planner)
-
-    def undo() -> None:
-        space.clearStateSamplerAllocator()
-        if restore is not None:
-            restore()
-        if keeps:
-            _renew_sampler(planner)
-
-    return undo
-
-
-def _renew_sampler(planner: Any) -> None:
-    """Set a planner up again, which says something of it on OMPL's log."""
-    if planner.isSetup():
-        with compat.log_level(ou.LOG_ERROR):
-            planner.setup()
-
-
-def _reject_uninformed(planner: Any) -> Callable[[], None]:
-    """Let an informed planner reject samples: direct informed sampling makes its own sampler."""
-    informed, rejection = planner.getInformedSampling(), planner.getSampleRejection()
-    planner.setInformedSampling(False)
-    planner.setSampleRejection(True)
-
-    def restore() -> None:
-        planner.setSampleRejection(False)
-        planner.setInformedSampling(informed)
-        planner.setSampleRejection(rejection)
-
-    return restore
-
-
-def _use_valid_state_sampler(wiring: _Wiring) -> Callable[[], None]:
-    si = wiring.setup.getSpaceInformation()
-    si.setValidStateSamplerAllocator(ompl_samplers.valid_state_sampler_allocator(wiring.sampler))
-    return lambda: compat.clear_valid_state_sampler(si)
-
-
-def _inject_goals(wiring: _Wiring) -> Callable[[], None]:
-    setup, planner = wiring.setup, wiring.planner
-    original, bias = setup.getGoal(), planner.getGoalBias()
-    si = setup.getSpaceInformation()
-    assert isinstance(wiring.monitor, GoalMonitor)
-    injected = InjectedGoal(si, original, wiring.states, wiring.sampler, wiring.monitor)
-    setup.setGoal(injected)
-    wiring.monitor.injected_goal = injected
-    wiring.monitor.set_injected_fraction(1.0)
-
-    def undo() -> None:
-        if setup.getGoal() is injected:
-            setup.setGoal(original)
-        planner.setGoalBias(bias)
-
-    return undo
-
-
-def _steer_bounds(wiring: _Wiring) -> Callable[[], None]:
-    assert isinstance(wiring.monitor, SteeringMonitor)
-    return install_steering(wiring.setup, wiring.states, wiring.sampler, wiring.monitor)
-
-
-_MONITORS = {GOAL_INJECTION: goal_monitor, BOUNDS_STEERING: SteeringMonitor}
-
-_INSTALL = {
-    BOUNDS_STEERING: _steer_bounds,
-    STATE_SAMPLER: _use_state_sampler,
-    VALID_STATE_SAMPLER: _use_valid_state_sampler,
-    GOAL_INJECTION: _inject_goals,
-}

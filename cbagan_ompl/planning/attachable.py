@@ -1,16 +1,18 @@
-"""What can be attached: a SimpleSetup, or a planner with its problem definition."""
+"""What can be attached: a SimpleSetup, geometric or of controls, or a planner with its task."""
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
 
-from ..errors import PlannerError, TaskError, show
+from ..errors import CbaganOmplWarning, PlannerError, TaskError, show
 from ..sampling.heatmap import Heatmap
 from . import compat
 from .compat import ob, og
 from .monitor import is_monitored
+from .planner_kinds import is_control_setup, is_written_in_python, plans_controls
 from .states import StateAccess
 
 
@@ -58,22 +60,18 @@ def setup_of(target: Any) -> Any:
         target: a SimpleSetup, or a planner with its problem definition.
 
     Raises:
-        PlannerError: it is neither, or plans controls.
+        PlannerError: it is neither.
     """
-    if compat.plans_controls(target):
-        raise PlannerError(
-            f"{type(target).__name__} is of ompl.control: a heat map reaches no control planner"
-        )
     if isinstance(target, ob.Planner):
         if target.getProblemDefinition() is None:
             raise PlannerError(
                 "attach needs the planner's task: call planner.setProblemDefinition(...) first"
             )
         return BareSetup(target)
-    if not isinstance(target, og.SimpleSetup):
+    if not (isinstance(target, og.SimpleSetup) or is_control_setup(target)):
         raise PlannerError(
-            "attach takes an ompl.geometric.SimpleSetup with its planner, or a planner with its "
-            f"problem definition, not {show(target)}"
+            "attach takes a SimpleSetup of ompl.geometric or ompl.control with its planner, or a "
+            f"planner with its problem definition, not {show(target)}"
         )
     return target
 
@@ -85,7 +83,8 @@ def planner_of(setup: Any) -> Any:
         setup: from :func:`setup_of`.
 
     Raises:
-        PlannerError: there is none, or one that no heat map can reach.
+        PlannerError: there is none, one that no heat map can reach, or a control planner in a
+            geometric setup or the other way round.
     """
     planner = setup.getPlanner()
     if planner is None:
@@ -94,17 +93,47 @@ def planner_of(setup: Any) -> Any:
         # OMPL 1.x makes a new object at each call for a planner that C++ has made. One that was
         # set stays the same.
         setup.setPlanner(planner)
-    if compat.plans_controls(planner):
-        raise PlannerError(
-            f"{type(planner).__name__} is a control planner of ompl.control, which no heat map "
-            "reaches"
-        )
-    if compat.is_written_in_python(planner):
+    if is_written_in_python(planner):
         raise PlannerError(
             f"{type(planner).__name__} is written in Python, so that it alone decides what it "
             "samples: let it take its samples from a HeatmapStateSampler(space, heatmap)"
         )
+    if not isinstance(setup, BareSetup) and is_control_setup(setup) != plans_controls(planner):
+        raise PlannerError(
+            "planner and setup are not of one kind, one is of ompl.control and the other one of "
+            "ompl.geometric: take both from the same module"
+        )
     return planner
+
+
+def warn_of_single_controls(planner: Any) -> None:
+    """Warn if a planner tries one control for each sample, which then makes no difference.
+
+    Args:
+        planner: of ``ompl.control``.
+    """
+    si = planner.getSpaceInformation()
+    if si.getStatePropagator() is None:
+        return  # which its own setup complains of
+    controls = si.allocDirectedControlSampler()
+    if type(controls).__name__ != "SimpleDirectedControlSampler":
+        return
+    name = type(planner).__name__
+    remedy = f"OMPL {compat.ompl_version()} lets Python set no other control sampler"
+    if hasattr(controls, "getNumControlSamples"):
+        if controls.getNumControlSamples() > 1:
+            return
+        remedy = (
+            "si.setDirectedControlSamplerAllocator(...) with a SimpleDirectedControlSampler(si, 10)"
+            " lets it try ten"
+        )
+    warnings.warn(
+        CbaganOmplWarning(
+            f"{name} takes its samples from the heat map, but tries a single control for each, so "
+            f"that they make no difference: {remedy}; control.RRT is served as it is"
+        ),
+        stacklevel=3,
+    )
 
 
 def check_task(setup: Any, heatmap: Heatmap, states: StateAccess) -> list[tuple[float, float]]:

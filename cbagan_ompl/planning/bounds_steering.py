@@ -29,7 +29,7 @@ from ..errors import PlannerError
 from ..sampling.sampler import HeatmapSampler
 from .compat import ob, plane_bounds, planner_data
 from .monitor import PlannerMonitor
-from .states import StateAccess, pose_space
+from .states import StateAccess, position_space
 
 # Nodes of the goal's tree from which on RRTConnect asks for further goal states in each iteration.
 _ASKING_SIZE = 4
@@ -90,8 +90,7 @@ class BoundsSteering:
     def __init__(
         self, space: Any, states: StateAccess, sampler: HeatmapSampler, monitor: SteeringMonitor
     ) -> None:
-        poses = pose_space(space)
-        self._space = space if poses is None else poses  # which has the bounds of the positions
+        self._space = position_space(space)
         self._read = states.read
         self._sampler = sampler
         self._monitor = monitor

@@ -215,19 +215,13 @@ class _AskedGoal(ob.GoalRegion):  # type: ignore[misc]
         return 1.0e300
 
 
-def plans_controls(value: Any) -> bool:
-    """Return whether a value is of ``ompl.control``, where planners have geometric ones' names."""
-    return any(".control" in module for module in _ompl_modules(value))
+def clear_planner(planner: Any) -> None:
+    """Clear a planner.
 
-
-def is_written_in_python(planner: Any) -> bool:
-    """Return whether a planner is a Python subclass of ``ob.Planner`` itself."""
-    return not any(".geometric" in module for module in _ompl_modules(planner))
-
-
-def _ompl_modules(value: Any) -> list[str]:
-    names = [kind.__module__ for kind in type(value).__mro__]
-    return [name for name in names if name.split(".")[0] == "ompl"]
+    One that was not set up has nothing to clear: PDST of ``ompl.control`` crashes then.
+    """
+    if not BOOST_PYTHON or planner.isSetup():
+        planner.clear()
 
 
 def clear_valid_state_sampler(si: Any) -> None:

@@ -13,8 +13,9 @@ from types import FrameType
 from typing import Any
 
 from ..errors import PlannerError
-from .hooks import asks_in_thread, class_name
+from .hooks import asks_in_thread
 from .monitor import PlannerMonitor
+from .planner_kinds import class_name
 from .states import StateAccess
 
 # The goal bias of RRT while it is not known whether it is RRT that asks. Below 1, so that its tree

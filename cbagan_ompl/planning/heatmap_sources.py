@@ -38,9 +38,9 @@ SAMPLERS = {
     AUTO: "learned or corridor, whichever is there sooner on a map of this size",
 }
 
-# Pixels up to which the grid search makes its heat map sooner than the network; measured by
-# scripts/search_speed.py, see docs/results/choices.md.
-_MOST_CORRIDOR_PIXELS = 1200 * 1200
+#: Pixels up to which the grid search makes its heat map sooner than the network; measured by
+#: scripts/search_speed.py, see docs/results/choices.md. A test holds it to the result file.
+MOST_CORRIDOR_PIXELS = 1450 * 1450
 
 #: What a result names its sampler when the caller brought the heat map.
 OWN_HEATMAP = "heatmap"
@@ -73,7 +73,7 @@ def resolve_auto(
         return sampler, model
     from ..inference.model_loading import can_predict
 
-    if grid.free.size <= _MOST_CORRIDOR_PIXELS or not can_predict():
+    if grid.free.size <= MOST_CORRIDOR_PIXELS or not can_predict():
         return CORRIDOR, None
     return LEARNED, model
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 from ..errors import PlannerError, show
 from .compat import BINDINGS, HAS_STATE_SAMPLER_ALLOCATOR, ompl_version, planner_names
+from .planner_kinds import CONTROL_PREFIX
 
 #: The planner asks a StateSampler of its space.
 STATE_SAMPLER = "state-sampler"
@@ -25,7 +27,7 @@ class PlannerTraits:
 
     Attributes:
         hook: what it samples from: :data:`STATE_SAMPLER`, :data:`VALID_STATE_SAMPLER` or
-            :data:`GOAL_INJECTION`.
+            :data:`GOAL_INJECTION`; None for a planner that nothing reaches.
         without_allocator: the hook on builds where no StateSampler can be set.
         stops_at_first: whether its solve ends with the first path.
         is_greedy: whether its trees grow in a few long strides, so that a narrow region serves it.
@@ -39,9 +41,11 @@ class PlannerTraits:
             adds one node at most.
         asks_in_thread: whether it asks its goal from a thread of its own, which hangs or crashes
             where the goal is written in Python.
+        needs_directed_controls: whether its samples are where controls lead to, and nothing else.
+            OMPL's default is to try a single control, so that they make no difference.
     """
 
-    hook: str
+    hook: str | None
     without_allocator: str | None = None
     stops_at_first: bool = False
     is_greedy: bool = False
@@ -51,6 +55,7 @@ class PlannerTraits:
     hangs_at_optimum: bool = False
     counts_iterations: bool = False
     asks_in_thread: bool = False
+    needs_directed_controls: bool = False
 
 
 _ROADMAP: dict[str, Any] = {
@@ -59,7 +64,7 @@ _ROADMAP: dict[str, Any] = {
     "asks_in_thread": True,
 }
 
-#: Every planner that some hook reaches on some build, by OMPL's name of its class.
+#: Every geometric planner that some hook reaches on some build, by OMPL's name of its class.
 PLANNERS = {
     "BFMT": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
     "BKPIECE1": PlannerTraits(VALID_STATE_SAMPLER, stops_at_first=True),
@@ -101,27 +106,40 @@ PLANNERS = {
     "TRRT": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
 }
 
+#: The same of ``ompl.control``.
+CONTROL_PLANNERS = {
+    "control.EST": PlannerTraits(
+        VALID_STATE_SAMPLER, stops_at_first=True, needs_directed_controls=True
+    ),
+    "control.PDST": PlannerTraits(STATE_SAMPLER, stops_at_first=True, needs_directed_controls=True),
+    "control.RRT": PlannerTraits(GOAL_INJECTION, stops_at_first=True),
+    "control.SST": PlannerTraits(STATE_SAMPLER),
+}
+
+_UNREACHED = PlannerTraits(None)
+
 
 def hook_of(planner: str) -> str:
     """Return the name of the hook that reaches a planner on the installed OMPL.
 
     Args:
-        planner: OMPL's name of its class, such as ``"RRTstar"``.
+        planner: OMPL's name of its class, such as ``"RRTstar"`` or ``"control.RRT"``.
 
     Raises:
         PlannerError: no hook of this build reaches it; the message says what would.
     """
-    traits = PLANNERS.get(planner)
-    if traits is None:
-        raise PlannerError(
-            f"no hook reaches {planner}: its samplers are made inside OMPL; {_list_reached()}"
-        )
+    traits = _traits_of(planner)
+    is_control = planner.startswith(CONTROL_PREFIX)
+    reached = _list_reached(reached_control_planners() if is_control else reached_planners())
+    if traits.hook is None:
+        reason = "it samples controls alone" if is_control else "its samplers are made inside OMPL"
+        raise PlannerError(f"no hook reaches {planner}: {reason}; {reached}")
     hook = _available_hook(traits)
     if hook is None:
         raise PlannerError(
             f"{planner} samples from a StateSampler, which OMPL {ompl_version()} does not let "
             "Python set: it needs a build that binds StateSpace.setStateSamplerAllocator, such "
-            f"as ompl 1.7.0; {_list_reached()}"
+            f"as ompl 1.7.0; {reached}"
         )
     return hook
 
@@ -129,12 +147,25 @@ def hook_of(planner: str) -> str:
 def reached_planners() -> dict[str, str]:
     """Return the planners of the installed OMPL that a hook reaches, each with the hook's name.
 
+    These are the geometric ones, see :func:`reached_control_planners` for others.
+
     Example:
         >>> reached_planners()["RRTstar"]
         'goal-injection'
     """
     hooks = {name: _available_hook(PLANNERS[name]) for name in planner_names() & PLANNERS.keys()}
     return {name: hook for name, hook in sorted(hooks.items()) if hook is not None}
+
+
+def reached_control_planners() -> dict[str, str]:
+    """Return the planners of ``ompl.control`` that a hook reaches, each with the hook's name.
+
+    Example:
+        >>> reached_control_planners()["control.RRT"]
+        'goal-injection'
+    """
+    hooks = {name: _available_hook(traits) for name, traits in CONTROL_PLANNERS.items()}
+    return {name: hook for name, hook in hooks.items() if hook is not None}
 
 
 def check_planner(planner: str, *, follows_heatmap: bool) -> None:
@@ -150,7 +181,11 @@ def check_planner(planner: str, *, follows_heatmap: bool) -> None:
     """
     names = planner_names()
     if not (isinstance(planner, str) and planner in names):
-        have = _list_reached() if follows_heatmap else f"there are {', '.join(sorted(names))}"
+        have = (
+            _list_reached(reached_planners())
+            if follows_heatmap
+            else f"there are {', '.join(sorted(names))}"
+        )
         raise PlannerError(
             f"there is no planner {show(planner)} to use on OMPL {ompl_version()}; {have}"
         )
@@ -171,32 +206,33 @@ def describe_planners() -> list[str]:
 
 def stops_at_first(planner: str) -> bool:
     """Return whether the solve of a planner ends with its first path."""
-    return planner in PLANNERS and PLANNERS[planner].stops_at_first
+    return _traits_of(planner).stops_at_first
 
 
 def wants_sharp(planner: str) -> bool:
     """Return whether a planner is served best by a heat map that is raised to a power."""
-    return not stops_at_first(planner) or PLANNERS[planner].is_greedy
+    traits = _traits_of(planner)
+    return not traits.stops_at_first or traits.is_greedy
 
 
 def keeps_sampler(planner: str) -> bool:
     """Return whether a planner makes its sampler when it is set up and keeps it from then on."""
-    return planner in PLANNERS and PLANNERS[planner].keeps_sampler
+    return _traits_of(planner).keeps_sampler
 
 
 def samples_are_nodes(planner: str) -> bool:
     """Return whether the samples of a planner become the nodes of a roadmap."""
-    return planner in PLANNERS and PLANNERS[planner].samples_are_nodes
+    return _traits_of(planner).samples_are_nodes
 
 
 def hangs_on_python_termination(planner: str) -> bool:
     """Return whether a solve with a termination condition in Python never returns."""
-    return planner in PLANNERS and PLANNERS[planner].hangs_with == BINDINGS
+    return _traits_of(planner).hangs_with == BINDINGS
 
 
 def hangs_at_optimum(planner: str) -> bool:
     """Return whether a solve never returns once it has a path as short as the straight line."""
-    return planner in PLANNERS and PLANNERS[planner].hangs_at_optimum
+    return _traits_of(planner).hangs_at_optimum
 
 
 def counts_iterations(planner: str) -> bool:
@@ -206,16 +242,16 @@ def counts_iterations(planner: str) -> bool:
 
 def asks_in_thread(planner: str) -> bool:
     """Return whether a planner asks its goal from a thread of its own."""
-    return planner in PLANNERS and PLANNERS[planner].asks_in_thread
+    return _traits_of(planner).asks_in_thread
 
 
-def class_name(planner: Any) -> str:
-    """Return OMPL's name of the class of a planner, also for Python subclasses of it."""
-    names = planner_names()
-    return next(
-        (kind.__name__ for kind in type(planner).__mro__ if kind.__name__ in names),
-        type(planner).__name__,
-    )
+def needs_directed_controls(planner: str) -> bool:
+    """Return whether samples matter to a planner only where several controls are tried."""
+    return _traits_of(planner).needs_directed_controls
+
+
+def _traits_of(planner: str) -> PlannerTraits:
+    return PLANNERS.get(planner) or CONTROL_PLANNERS.get(planner) or _UNREACHED
 
 
 def _available_hook(traits: PlannerTraits) -> str | None:
@@ -224,5 +260,5 @@ def _available_hook(traits: PlannerTraits) -> str | None:
     return traits.hook
 
 
-def _list_reached() -> str:
-    return f"heat maps reach {', '.join(reached_planners())}"
+def _list_reached(planners: Iterable[str]) -> str:
+    return f"heat maps reach {', '.join(planners)}"

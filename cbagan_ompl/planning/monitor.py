@@ -6,12 +6,11 @@ import atexit
 import gc
 import sys
 import weakref
-from collections.abc import Sequence
 from math import inf
 from threading import get_ident
 from time import perf_counter
 from types import CodeType, FrameType
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -22,6 +21,9 @@ from .compat import best_cost, new_state, ob, planner_data, start_states, typed_
 from .solution_cost import SolutionCost
 from .solve_watch import SolveWatch
 from .states import StateAccess, is_distance_bound
+
+# Positions (x, y).
+_Points: TypeAlias = list[tuple[float, float]]
 
 # A goal region without end is represented by this many samples of it in the informed set.
 _MAX_GOALS = 100
@@ -54,6 +56,8 @@ class PlannerMonitor:
         self._cost = SolutionCost(self._problem) if tells_cost else None
         self.injected_goal: Any = None
         self.injected_fraction = 1.0
+        # Endpoints of which it is known whether the heat map connects them.
+        self._known: tuple[object, bool] = None, False
         self._call: tuple[CodeType, int, int] | None = None
         self._paths_at_call = 0
         self._watches: list[SolveWatch] = []
@@ -121,14 +125,9 @@ class PlannerMonitor:
 
     def connects(self, heatmap: Heatmap) -> bool:
         """Return whether a region connects a start with a goal, once planning has begun."""
-        endpoints = self._endpoints()
-        if not len(endpoints.goals):
-            return True  # a goal that has no samples yet can be anywhere
-        return any(
-            heatmap.connects(start, goal) for start in endpoints.starts for goal in endpoints.goals
-        )
+        return self._connects(heatmap, self._starts(), self._goals())
 
-    def prepare(self, heatmap: Heatmap, starts: Sequence[tuple[float, float]]) -> None:
+    def prepare(self, heatmap: Heatmap, starts: _Points) -> None:
         """Find out beforehand what :meth:`connects` will ask, where the task is a plain one.
 
         Args:
@@ -136,7 +135,15 @@ class PlannerMonitor:
             starts: positions of the start states.
         """
         if len(starts) == 1 and isinstance(self._goal, ob.GoalState):
-            heatmap.connects(starts[0], self._goals()[0])
+            self._connects(heatmap, starts, self._goals())
+
+    def _connects(self, heatmap: Heatmap, starts: _Points, goals: _Points) -> bool:
+        if not goals:
+            return True  # a goal that has no samples yet can be anywhere
+        if self._known[0] != (starts, goals):
+            found = any(heatmap.connects(start, goal) for start in starts for goal in goals)
+            self._known = (starts, goals), found
+        return self._known[1]
 
     def node_count(self) -> int:
         """Return the number of nodes of the tree."""
@@ -199,10 +206,14 @@ class PlannerMonitor:
         self._cost = self.injected_goal = None
 
     def _endpoints(self) -> InformedSet:
-        starts = [self._states.read(start) for start in start_states(self._planner)]
-        return InformedSet(np.array(starts), np.array(self._goals()), self._goal.getThreshold())
+        starts, goals = np.array(self._starts()), np.array(self._goals())
+        return InformedSet(starts, goals, self._goal.getThreshold())
 
-    def _goals(self) -> list[tuple[float, float]]:
+    def _starts(self) -> _Points:
+        """Return positions of the start states, once the planner has begun to plan."""
+        return [self._states.read(start) for start in start_states(self._planner)]
+
+    def _goals(self) -> _Points:
         """Return positions of goal states, sampled from the goal."""
         state = new_state(self._planner.getSpaceInformation().getStateSpace())
         typed = typed_state(state)

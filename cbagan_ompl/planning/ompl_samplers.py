@@ -22,7 +22,7 @@ class HeatmapStateSampler(ob.StateSampler):  # type: ignore[misc]
 
     Args:
         space: RealVectorStateSpace(2), SE2StateSpace, DubinsStateSpace, ReedsSheppStateSpace, or a
-            compound space whose first part is one of the last three.
+            compound space whose first part is one of them; the other parts are sampled uniformly.
         heatmap: what to sample; or a :class:`HeatmapSampler`, to share it with other samplers.
         options: how samples follow the heat map; ``sharpness`` None stands for 1.
         **changes: single fields of :class:`SamplerOptions`, such as ``seed=1``.

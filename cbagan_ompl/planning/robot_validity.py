@@ -13,7 +13,7 @@ from ..robots.robot import Robot, check_robot
 from ..robots.shape_checker import Pose, ShapeChecker
 from . import compat
 from .compat import ob
-from .states import pose_space, read_pose, space_of
+from .states import pose_space, position_space, read_pose, space_of
 from .validity import set_last_valid
 
 
@@ -25,8 +25,8 @@ class RobotValidityChecker(ob.StateValidityChecker):  # type: ignore[misc]
 
     Args:
         si: the space information. Its space is a RealVectorStateSpace(2) for a robot without
-            heading, else SE2StateSpace, DubinsStateSpace, ReedsSheppStateSpace or a compound space
-            whose first part is one of those.
+            heading, else SE2StateSpace, DubinsStateSpace or ReedsSheppStateSpace; or a compound
+            space whose first part is one of them. An ``ompl.control.SpaceInformation`` will do.
         grid: the map, not inflated.
         robot: what moves.
 
@@ -178,23 +178,24 @@ def pose_reader(space: Any, robot: Robot) -> Callable[[Any], Pose]:
     Raises:
         PlannerError: the states have no pose, or no yaw for a robot that has a heading.
     """
-    poses = pose_space(space)
-    if poses is space:
-        return read_pose
-    if poses is not None:
-        return lambda state: read_pose(state[0])
-    if isinstance(space, ob.RealVectorStateSpace) and space.getDimension() == 2:
-        if robot.has_heading:
-            raise PlannerError(
-                f"a robot with a heading plans in {robot.state_space}, whose states have a yaw, "
-                "not in RealVectorStateSpace"
-            )
-        return lambda state: (state[0], state[1], 0.0)
-    raise PlannerError(
-        "robots are checked in RealVectorStateSpace(2), SE2StateSpace, DubinsStateSpace, "
-        "ReedsSheppStateSpace and compound spaces whose first part is one of the last three, not "
-        f"in {type(space).__name__} of dimension {space.getDimension()}"
-    )
+    part = position_space(space)
+    if part is None:
+        raise PlannerError(
+            "robots are checked in RealVectorStateSpace(2), SE2StateSpace, DubinsStateSpace, "
+            "ReedsSheppStateSpace and compound spaces whose first part is one of them, not in "
+            f"{type(space).__name__} of dimension {space.getDimension()}"
+        )
+    if pose_space(space) is None and robot.has_heading:
+        raise PlannerError(
+            f"a robot with a heading plans in {robot.state_space}, whose states have a yaw, not "
+            "in RealVectorStateSpace"
+        )
+    read = _read_position if pose_space(space) is None else read_pose
+    return read if part is space else lambda state: read(state[0])
+
+
+def _read_position(state: Any) -> Pose:
+    return state[0], state[1], 0.0
 
 
 def _largest_curvature(space: Any) -> float | None:

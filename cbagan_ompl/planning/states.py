@@ -67,17 +67,17 @@ class PoseStateAccess:
 
 
 class CompoundStateAccess:
-    """Access to states of a CompoundStateSpace whose first part has poses.
+    """Access to states of a CompoundStateSpace whose first part has the positions.
 
     The other parts of a sample come from their own samplers, uniform.
 
     Args:
         space: the space.
-        headings: as for :class:`PoseStateAccess`.
+        first: access to the states of its first part.
     """
 
-    def __init__(self, space: Any, headings: HeadingSampler | None) -> None:
-        self._pose = PoseStateAccess(headings)
+    def __init__(self, space: Any, first: StateAccess) -> None:
+        self._first = first
         self._space = space  # keeps the parts alive, which their samplers refer to
         self._others = [
             (part, space.getSubspace(part).allocDefaultStateSampler())
@@ -86,11 +86,11 @@ class CompoundStateAccess:
 
     def read(self, state: Any) -> tuple[float, float]:
         """Return the (x, y) of a state."""
-        return self._pose.read(state[0])
+        return self._first.read(state[0])
 
     def write(self, state: Any, x: float, y: float) -> None:
         """Set (x, y), sample everything else; arguments as for :meth:`StateAccess.write`."""
-        self._pose.write(state[0], x, y)
+        self._first.write(state[0], x, y)
         for part, sampler in self._others:
             sampler.sampleUniform(state[part])
 
@@ -107,22 +107,38 @@ def state_access(space: Any, headings: HeadingSampler | None = None) -> StateAcc
     """
     if not isinstance(space, ob.StateSpace):
         raise PlannerError(f"expected a state space of ompl.base, got {show(space)}")
-    if isinstance(space, ob.SE2StateSpace):
-        return PoseStateAccess(headings)
-    if pose_space(space) is not None:
-        return CompoundStateAccess(space, headings)
-    if isinstance(space, ob.RealVectorStateSpace) and space.getDimension() == 2:
-        return PlaneStateAccess()
-    raise PlannerError(
-        "a 2-D heat map serves RealVectorStateSpace(2), SE2StateSpace, DubinsStateSpace, "
-        "ReedsSheppStateSpace and compound spaces whose first part is one of the last three, not "
-        f"{type(space).__name__} of dimension {space.getDimension()}"
-    )
+    part = position_space(space)
+    if part is None:
+        raise PlannerError(
+            "a 2-D heat map serves RealVectorStateSpace(2), SE2StateSpace, DubinsStateSpace, "
+            "ReedsSheppStateSpace and compound spaces whose first part is one of them, not "
+            f"{type(space).__name__} of dimension {space.getDimension()}"
+        )
+    has_heading = isinstance(part, ob.SE2StateSpace)
+    access: StateAccess = PoseStateAccess(headings) if has_heading else PlaneStateAccess()
+    return access if part is space else CompoundStateAccess(space, access)
 
 
 def read_pose(state: Any) -> tuple[float, float, float]:
     """Return the (x, y, yaw) of a state of an SE2StateSpace."""
     return state.getX(), state.getY(), state.getYaw()
+
+
+def position_space(space: Any) -> Any:
+    """Return the space of positions or poses that a space is or holds as its first part.
+
+    Args:
+        space: an OMPL state space.
+
+    Returns:
+        A RealVectorStateSpace(2) or an SE2StateSpace; None without one.
+    """
+    if isinstance(space, ob.SE2StateSpace):  # a compound space itself
+        return space
+    is_compound = isinstance(space, ob.CompoundStateSpace) and space.getSubspaceCount()
+    part = space.getSubspace(0) if is_compound else space
+    is_plane = isinstance(part, ob.RealVectorStateSpace) and part.getDimension() == 2
+    return part if is_plane or isinstance(part, ob.SE2StateSpace) else None
 
 
 def pose_space(space: Any) -> Any:
@@ -131,12 +147,8 @@ def pose_space(space: Any) -> Any:
     Args:
         space: an OMPL state space.
     """
-    if isinstance(space, ob.SE2StateSpace):
-        return space
-    if isinstance(space, ob.CompoundStateSpace) and space.getSubspaceCount():
-        first = space.getSubspace(0)
-        return first if isinstance(first, ob.SE2StateSpace) else None
-    return None
+    part = position_space(space)
+    return part if isinstance(part, ob.SE2StateSpace) else None
 
 
 def is_distance_bound(space: Any) -> bool:
@@ -149,12 +161,12 @@ def is_distance_bound(space: Any) -> bool:
     Args:
         space: one that :func:`state_access` serves.
     """
-    poses = pose_space(space)
-    if poses is None:
-        return True
-    weight = 1.0 if poses is space else space.getSubspaceWeight(0)
-    if not isinstance(poses, ob.DubinsStateSpace | ob.ReedsSheppStateSpace):
-        weight *= poses.getSubspaceWeight(0)
+    part = position_space(space)
+    weight = 1.0 if part is space else space.getSubspaceWeight(0)
+    if isinstance(part, ob.SE2StateSpace) and not isinstance(
+        part, ob.DubinsStateSpace | ob.ReedsSheppStateSpace
+    ):
+        weight *= part.getSubspaceWeight(0)
     return bool(weight >= 1)
 
 
@@ -184,6 +196,5 @@ def position_bounds(space: Any) -> tuple[NDArray[np.float64], NDArray[np.float64
     Args:
         space: one that :func:`state_access` serves.
     """
-    poses = pose_space(space)
-    bounds = (space if poses is None else poses).getBounds()
+    bounds = position_space(space).getBounds()
     return np.array(list(bounds.low)[:2]), np.array(list(bounds.high)[:2])

@@ -68,6 +68,8 @@ class Heatmap:
         (3, 2)
     """
 
+    _last_connected: tuple[object, bool] = None, False  # a pair of pixels, and the answer
+
     def __init__(self, values: ArrayLike, grid: GridMap, heading: ArrayLike | None = None) -> None:
         check_grid(grid, HeatmapError)
         try:
@@ -95,7 +97,6 @@ class Heatmap:
         self.heading = None if heading is None else check_headings(heading, grid)
         self.guarantee: Guarantee | None = None
         self._support = support
-        self._last_connected: tuple[object, bool] = None, False  # a pair of pixels, the answer
 
     @classmethod
     def load(cls, path: str | PathLike[str], grid: GridMap) -> Heatmap:

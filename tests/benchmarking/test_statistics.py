@@ -7,14 +7,9 @@ import pytest
 from helpers.logs import make_log, solved, unsolved
 from scipy.stats import bootstrap
 
+from cbagan_ompl.benchmarking.intervals import median_interval, ratio, ratio_interval
 from cbagan_ompl.benchmarking.logs import ExperimentLog
-from cbagan_ompl.benchmarking.statistics import (
-    Summary,
-    median_interval,
-    ratio,
-    ratio_interval,
-    summarize,
-)
+from cbagan_ompl.benchmarking.statistics import Summary, summarize
 
 
 def by_sampler(logs: list[ExperimentLog]) -> dict[str, Summary]:
@@ -56,6 +51,11 @@ def test_summary_against_hand_computed_values() -> None:
     assert uniform.measures["final_cost"].median == pytest.approx(1.2)
     assert uniform.measures["final_cost"].high == inf
     assert uniform.censored["nodes"] == pytest.approx(2 / 9)
+    # None of the paths of uniform is within 5 %: its nodes are those that it has added in all.
+    assert uniform.measures["nodes_to_5_percent"].median == 80
+    assert uniform.censored["nodes_to_5_percent"] == 1
+    assert learned.measures["nodes_to_5_percent"].median == 10
+    assert learned.ratios["nodes_to_first"].median == 1
     # Ratios by task: 0.2 / 0.4, 0.2 / 0.1, 0.2 / 1.
     assert learned.ratios["first_solution_s"].median == pytest.approx(0.5)
     assert learned.ratios["first_solution_total_s"].median == pytest.approx(0.75)

@@ -17,6 +17,8 @@ import pytest
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 # What each prints, and the files that it leaves in the working directory.
 EXPECTED = {
+    "control_kinematic_car.py": ("exact: True", ()),
+    "control_second_order_car.py": ("exact: True", ()),
     "nav_msgs_node.py": ("no ROS here", ()),
     "own_heatmap.py": ("connects start and goal: True", ()),
     "plain_ompl_script.py": ("hook: goal-injection", ()),

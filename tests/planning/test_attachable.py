@@ -102,18 +102,6 @@ def test_a_planner_needs_its_task() -> None:
         attach(planner, HEATMAP)
 
 
-def test_control_planners_are_told_apart() -> None:
-    """They have the names of geometric ones."""
-    from ompl import control as oc
-
-    space = compat.plane_space(*GRID.bounds)
-    controls = oc.RealVectorControlSpace(space, 2)
-    si = oc.SpaceInformation(space, controls)
-    for value in (oc.RRT(si), oc.SimpleSetup(controls)):
-        with pytest.raises(PlannerError, match=r"ompl\.control"):
-            attach(value, HEATMAP)
-
-
 class RandomTree(ob.Planner):  # type: ignore[misc]
     """A planner of somebody's own, which does nothing."""
 

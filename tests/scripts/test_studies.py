@@ -74,6 +74,19 @@ def test_headings(tmp_path: Path) -> None:
     assert all((row["inference_ms"] > 0) == (row["sampler"] != "OMPL's own") for row in summary)
 
 
+@pytest.mark.slow
+def test_control(tmp_path: Path) -> None:
+    pytest.importorskip("torch")
+    rows, report = tmp_path / "rows.jsonl", tmp_path / "control.json"
+    words = ["--count", "1", "--seeds", "1", "--time", "0.2", "--rows", str(rows)]
+    for _ in range(2):  # the second time every run is there already
+        run_script(STUDIES / "control.py", *words, "--json", str(report))
+        assert len(rows.read_text().splitlines()) == 4
+    summary = json.loads(report.read_text())["rows"]
+    assert [row["sampler"] for row in summary] == ["OMPL's own", "learned"] * 2
+    assert [row["ratio"] for row in summary[::2]] == [1, 1]
+
+
 def test_replanning(tmp_path: Path) -> None:
     pytest.importorskip("torch")
     report = tmp_path / "replanning.json"
