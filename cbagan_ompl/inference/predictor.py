@@ -23,7 +23,6 @@ from ..robots.robot import Robot
 from ..sampling.bridges import connect
 from ..sampling.guarantee import Guarantee
 from ..sampling.heatmap import Heatmap
-from ..sampling.painted_headings import set_painted_headings
 from .bundled_models import find_model
 from .choice import make_pipeline
 from .graphs import TorchGraphs
@@ -314,11 +313,8 @@ def _make_heatmap(painting: Painting, task: int, grid: GridMap) -> Heatmap:
     """Return the heat map of one of the tasks that a network has painted."""
     from ..sampling.painting import paint_heatmap  # here, since numba takes long to import
 
-    heatmap = paint_heatmap(painting.region[task], grid, _LEAST_VALUE)
-    if heatmap is None:
-        return Heatmap(np.full(grid.shape, _FLOOR, np.float32), grid)
-    if painting.directions is not None:
-        height, width = painting.region.shape[1:]
-        patches = height / _PATCH, width / _PATCH
-        set_painted_headings(heatmap, painting.directions[task], patches)
-    return heatmap
+    height, width = painting.region.shape[1:]
+    directions = None if painting.directions is None else painting.directions[task]
+    patches = height / _PATCH, width / _PATCH
+    heatmap = paint_heatmap(painting.region[task], grid, _LEAST_VALUE, directions, patches)
+    return heatmap or Heatmap(np.full(grid.shape, _FLOOR, np.float32), grid)

@@ -2,42 +2,65 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.compilation import compiled
 from .heatmap import Heatmap
 
 
-def set_painted_headings(
-    heatmap: Heatmap, directions: NDArray[np.float32], patches: tuple[float, float]
-) -> None:
-    """Set the headings of a heat map that no one else has yet.
+class PaintedHeatmap(Heatmap):
+    """A heat map whose headings are computed when they are first asked for.
 
-    Args:
-        heatmap: its headings are set where it is not 0.
+    Made by :func:`.painting.paint_heatmap` alone.
+
+    Attributes:
         directions: (2, h, w), unit vectors (u, v) of each patch, u right and v down; 0 where
             unknown.
         patches: rows and columns of patches that cover the map, at most (h, w); the last ones may
             be cut off by its edge.
-
-    Example:
-        >>> from cbagan_ompl import GridMap
-        >>> heatmap = Heatmap([[1.0, 0.0, 1.0, 1.0]], GridMap([[1, 1, 1, 1]]))
-        >>> set_painted_headings(heatmap, np.array([[[1, 0]], [[0, 0]]], np.float32), (1, 2))
-        >>> heatmap.heading.tolist()
-        [[0.0, nan, nan, nan]]
     """
-    grid = heatmap.grid
-    angles = np.arctan2(directions[1], directions[0])
-    angles[(directions == 0).all(axis=0)] = np.nan
-    if grid.origin is not None:  # a ROS map is turned by the yaw of its origin, and y points up
-        angles = (np.float32(grid.origin[2]) - angles + np.pi) % (2 * np.pi) - np.pi
-    rows, columns = (
-        ((np.arange(size) + 0.5) * count / size).astype(np.intp)
-        for size, count in zip(grid.shape, patches, strict=True)
-    )
-    row, column = np.divmod(heatmap._support, grid.width)
-    heading = np.full(grid.shape, np.nan, np.float32)
-    heading.ravel()[heatmap._support] = angles[rows[row], columns[column]]
-    heading.setflags(write=False)
-    heatmap.heading = heading
+
+    directions: NDArray[np.float32]
+    patches: tuple[float, float]
+
+    @cached_property
+    def heading(self) -> NDArray[np.float32]:  # type: ignore[override]
+        """The direction of travel where the heat map is not 0, see :class:`.heatmap.Heatmap`."""
+        angles = np.arctan2(self.directions[1], self.directions[0])
+        angles[(self.directions == 0).all(axis=0)] = np.nan
+        if self.grid.origin is not None:  # turned by the yaw of its origin, and y points up
+            angles = (np.float32(self.grid.origin[2]) - angles + np.pi) % (2 * np.pi) - np.pi
+        rows, columns = (
+            ((np.arange(size) + 0.5) * count / size).astype(np.intp)
+            for size, count in zip(self.grid.shape, self.patches, strict=True)
+        )
+        heading = np.full(self.grid.shape, np.nan, np.float32)
+        _spread(angles.astype(np.float32), rows, columns, self._support, heading)
+        heading.setflags(write=False)
+        return heading
+
+
+@compiled
+def _spread(
+    angles: NDArray[np.float32],
+    rows: NDArray[np.intp],
+    columns: NDArray[np.intp],
+    support: NDArray[np.intp],
+    heading: NDArray[np.float32],
+) -> None:  # pragma: no cover
+    """Write the angle of its patch into each pixel of the support, in place.
+
+    Args:
+        angles: of the patches.
+        rows: of the patches, for each row of pixels.
+        columns: the same for columns.
+        support: flat indices of pixels.
+        heading: of the pixels.
+    """
+    width = heading.shape[1]
+    for index in support:
+        row = index // width
+        heading[row, index - row * width] = angles[rows[row], columns[index - row * width]]
