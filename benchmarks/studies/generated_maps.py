@@ -1,7 +1,7 @@
 """Heat maps of models on generated maps that no training saw, by kind of map, without repair.
 
-    python benchmarks/studies/generated_maps.py --model cbagan-worlds --not-learned \
-        --json benchmarks/results/generated_maps.json
+    python benchmarks/studies/generated_maps.py --not-learned --model before=OLD.pt \
+        --model bundled=cbagan-worlds --json benchmarks/results/generated_maps.json
 
 The maps come from the generators that training uses too, but from other random numbers, at sizes
 of 128 to 512 pixels. Reported of each kind: the fraction of tasks whose region connects start and
@@ -72,13 +72,16 @@ class Case(NamedTuple):
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--model", action="append", metavar="FILE")
+    parser.add_argument(
+        "--model", action="append", metavar="NAME=FILE", required=True, help="to load, by a name"
+    )
     parser.add_argument("--not-learned", action="store_true")
     parser.add_argument("--maps", type=int, default=24, help=f"of each kind, {TASKS} tasks each")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--json", metavar="FILE")
     args = parser.parse_args()
-    predictors = {name: load_model(name) for name in args.model or ["cbagan-worlds"]}
+    named = (model.split("=", 1) for model in args.model)
+    predictors = {name: load_model(file) for name, file in named}
     if args.not_learned:
         predictors["not learned"] = predictor_without_training()
     result: dict[str, Any] = {"maps": args.maps, "seed": args.seed}
@@ -91,13 +94,13 @@ def main() -> None:
             result["models"][name][kind] = row
             errors.setdefault(f"{name}: painted", []).append(painted)
             errors.setdefault(f"{name}: descent", []).append(descended)
-    for rows in result["models"].values():
-        rows["all"] = {key: mean_of(rows.values(), key) for key in ("connected", "area", "iou")}
     result["angles"] = {
-        name: quantiles(np.concatenate(parts))
-        for name, parts in errors.items()
-        if any(map(len, parts))
+        name: quantiles(np.concatenate(parts)) for name, parts in errors.items() if parts[0].size
     }
+    for name, rows in result["models"].items():
+        rows["all"] = {key: mean_of(rows.values(), key) for key in ("connected", "area", "iou")}
+        if f"{name}: painted" in result["angles"]:
+            rows["all"]["angles"] = result["angles"][f"{name}: painted"]
     print_result(result)
     if args.json is not None:
         write_json(args.json, result)

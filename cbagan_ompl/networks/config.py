@@ -182,10 +182,10 @@ class NetworkConfig:
 
     def __post_init__(self) -> None:
         check_types(self, {field.name: field.default for field in fields(self)})
-        least = 2 if self.passages else 3
+        least, text = (2, "two") if self.passages else (3, "three")
         if len(self.widths) < least or min(self.widths) < 1:
             raise ConfigError(
-                f"widths are {least} or more positive numbers, got {show(self.widths)}"
+                f"widths are {text} or more positive numbers, got {show(self.widths)}"
             )
         if len(self.widths) > _MAX_STAGES or max(self.widths) > _MAX_WIDTH:
             raise ConfigError(
