@@ -158,6 +158,25 @@ def ablation() -> str:
     return table(["network", "IoU", "Dice", "connected (8)"], rows)
 
 
+def generated_maps() -> str:
+    models = read("generated_maps.json")["models"]
+    names = {"before": "version 1.0", "not learned": "not learned", "bundled": "bundled model"}
+    header = ["kind of maps"]
+    for name in names.values():
+        header += [f"connected (8): {name}", "IoU"]
+    header += ["angle: not learned", "bundled model"]
+    rows = []
+    for kind in models["bundled"]:
+        row = [kind]
+        for name in names:
+            scores = models[name][kind]
+            row += [f"{100 * scores['connected']:.1f} %", f"{scores['iou']:.3f}"]
+        angles = (models[name][kind]["angles"] for name in ("not learned", "bundled"))
+        row += [f"{angle['median']:.2f}, {angle['p90']:.2f}" for angle in angles]
+        rows.append(row)
+    return table(header, rows)
+
+
 def connected(scores: Json) -> str:
     return f"{100 * scores['connectivity']:.1f} %"
 
@@ -293,6 +312,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "wrong_heatmaps_by_planner": wrong_heatmaps_by_planner,
     "sharpness": sharpness,
     "labels": labels,
+    "generated_maps": generated_maps,
     "ablation": ablation,
     "regions": regions,
     "label_noise": label_noise,
