@@ -120,3 +120,19 @@ def test_wrong_heatmaps(tmp_path: Path) -> None:
     planners = json.loads(report.read_text())["planners"]
     assert set(planners) == {"RRT", "RRTstar"}
     assert all(row["solved"] == 1 for rows in planners.values() for row in rows.values())
+
+
+@pytest.mark.slow
+def test_generated_maps(tmp_path: Path) -> None:
+    pytest.importorskip("torch")
+    report = tmp_path / "generated.json"
+    words = ["--model", "bundled=cbagan-worlds", "--not-learned", "--maps", "1"]
+    printed = run_script(STUDIES / "generated_maps.py", *words, "--json", str(report))
+    assert "| fine mazes |" in printed
+    result = json.loads(report.read_text())
+    assert result["models"].keys() == {"bundled", "not learned"}
+    scores = result["models"]["not learned"]
+    assert all(row["tasks"] == 4 for kind, row in scores.items() if kind != "all")
+    assert scores["all"]["connected"] > 0.9
+    assert scores["all"]["iou"] > 0.8
+    assert scores["all"]["angles"]["median"] < 0.15
