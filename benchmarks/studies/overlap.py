@@ -50,7 +50,7 @@ def main() -> None:
     args = parser.parse_args()
     end = perf_counter() + args.seconds
     maps = args.maps or [f"bundled:{name}" for name in bundled_maps()]
-    tasks = [task for task in select_tasks(maps, args.tasks) if task.number < args.tasks_per_map]
+    tasks = select_tasks(maps, args.tasks, args.tasks_per_map).tasks
     rows = Path(args.rows)
     done = [json.loads(line) for line in rows.read_text().splitlines()] if rows.exists() else []
     known = {tuple(row["key"]) for row in done}
