@@ -75,7 +75,7 @@ def rrtconnect() -> str:
                 for sampler, row in samplers.items():
                     ratio = "{:.2f} [{:.2f}, {:.2f}]".format(*row["processor_ratio"])
                     times = [
-                        f"{row[f'{clock}_ms{of}']:.2g} ms"
+                        f"{row[f'{clock}_ms{of}']:.3g} ms"
                         for clock in ("clock", "processor")
                         for of in ("", "_p90")
                     ]
