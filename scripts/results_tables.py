@@ -14,8 +14,11 @@ import argparse
 from collections.abc import Callable
 from pathlib import Path
 
+from calibrate import calibration_table, files_table
+from inference_speed import speed_table as speed_of_models
 from planner_tables import Json, ratios_table
 from search_speed import speed_table
+from study_tables import control, overlap
 from suite_tables import (
     ROOT,
     VERSIONS,
@@ -156,6 +159,25 @@ def ablation() -> str:
     return table(["network", "IoU", "Dice", "connected (8)"], rows)
 
 
+def generated_maps() -> str:
+    models = read("generated_maps.json")["models"]
+    names = {"before": "version 1.0", "not learned": "not learned", "bundled": "bundled model"}
+    header = ["kind of maps"]
+    for name in names.values():
+        header += [f"connected (8): {name}", "IoU"]
+    header += ["angle: not learned", "bundled model"]
+    rows = []
+    for kind in models["bundled"]:
+        row = [kind]
+        for name in names:
+            scores = models[name][kind]
+            row += [f"{100 * scores['connected']:.1f} %", f"{scores['iou']:.3f}"]
+        angles = (models[name][kind]["angles"] for name in ("not learned", "bundled"))
+        row += [f"{angle['median']:.2f}, {angle['p90']:.2f}" for angle in angles]
+        rows.append(row)
+    return table(header, rows)
+
+
 def connected(scores: Json) -> str:
     return f"{100 * scores['connectivity']:.1f} %"
 
@@ -291,12 +313,18 @@ TABLES: dict[str, Callable[[], str]] = {
     "wrong_heatmaps_by_planner": wrong_heatmaps_by_planner,
     "sharpness": sharpness,
     "labels": labels,
+    "generated_maps": generated_maps,
     "ablation": ablation,
     "regions": regions,
     "label_noise": label_noise,
     "networks": networks,
     "paper_tables": paper_tables,
     "replanning": replanning,
+    "calibration": lambda: calibration_table(read("calibration.json")),
+    "calibration_real_maps": lambda: files_table(read("calibration.json")),
+    "inference_speed": lambda: speed_of_models(read("inference_speed.json")),
+    "control": control,
+    "overlap": overlap,
     "search_speed": lambda: speed_table(read("search_speed.json")),
 }
 

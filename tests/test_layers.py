@@ -15,7 +15,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "cbagan_ompl"
 #: Each layer with the packages and modules below it, which are all that it may import.
 BELOW = {
     "errors": set[str](),
-    "networks": {"errors"},
+    "networks": {"errors", "common"},
     "common": {"errors"},
     "map_generators": {"errors", "common"},
     "maps": {"errors", "common"},

@@ -124,6 +124,11 @@ def _add_sampler(sampler: Any) -> None:
         metavar="FILE",
         help="sample from this image or .npy instead of a model's heat map",
     )
+    sampler.add_argument(
+        "--overlap",
+        action="store_true",
+        help="let the planner begin on OMPL's own sampler while the heat map is made",
+    )
     add_sampler_options(sampler)
 
 
@@ -159,6 +164,7 @@ def _plan(args: argparse.Namespace) -> int:
         snap=args.snap,
         model=args.model,
         heatmap=None if args.heatmap is None else Heatmap.load(args.heatmap, grid),
+        overlap=args.overlap,
         simplify=args.simplify,
         keep_tree=args.output is not None and not args.no_tree,
         options=sampler_options(args),

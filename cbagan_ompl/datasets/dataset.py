@@ -62,6 +62,8 @@ class Tasks:
         goal: (N, 2), the same.
         region: (N, S, S), the labels: uint8 0 or 1, 1 in the region, in a data set on disk; float16
             from 0 to 1 in synthetic tasks (:mod:`cbagan_ompl.datasets.synthetic`).
+        direction: (N, 2, S // 4, S // 4) float16, the directions of travel of synthetic tasks, see
+            :func:`cbagan_ompl.datasets.geodesic_labels.travel_directions`; None where unknown.
     """
 
     maps: NDArray[np.uint8]
@@ -69,6 +71,7 @@ class Tasks:
     start: NDArray[np.float32]
     goal: NDArray[np.float32]
     region: NDArray[np.uint8 | np.float16]
+    direction: NDArray[np.float16] | None = None
 
     def __len__(self) -> int:
         return len(self.region)
@@ -91,6 +94,7 @@ class Tasks:
             self.start[indices],
             self.goal[indices],
             self.region[indices],
+            None if self.direction is None else self.direction[indices],
         )
 
 

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from ..common.validation import check_at_least, check_fraction
 from ..map_generators import MAP_GENERATORS, MIN_SIZE, check_generators
 from ..map_generators.randomization import randomized_map
+from ..map_generators.shapes import inflate
 from .dataset import Tasks
-from .geodesic_labels import EPSILON, SLACK, geodesic_label
+from .geodesic_labels import EPSILON, SLACK, geodesic_label, travel_directions
 
 #: Tasks on each map.
 TASKS_PER_MAP = 8
@@ -25,6 +26,8 @@ HARD_DETOUR = 1.3
 
 # Points on each map; any two of them can be start and goal of a task.
 _POINTS = 6
+# Least fraction of an inflated map that is free.
+_LEAST_FREE = 0.08
 # Least distance from start to goal, as a fraction of the map's size.
 _MIN_DISTANCE = 0.2
 
@@ -37,6 +40,8 @@ class SyntheticSettings:
         size: width and height of the maps in pixels.
         generators: keys of :data:`cbagan_ompl.map_generators.MAP_GENERATORS`, all equally likely.
         hard_fraction: fraction of hard tasks (see :data:`HARD_DETOUR`), where a map has that many.
+        inflated_fraction: fraction of the maps whose obstacles are inflated by a radius of 1 pixel
+            to a 32nd of the size, as for a robot.
         seed: of all random numbers.
 
     Raises:
@@ -50,12 +55,14 @@ class SyntheticSettings:
     size: int = 256
     generators: tuple[str, ...] = tuple(MAP_GENERATORS)
     hard_fraction: float = 0.65
+    inflated_fraction: float = 0.2
     seed: int = 0
 
     def __post_init__(self) -> None:
         check_at_least("size", self.size, MIN_SIZE)
         check_generators(self.generators)
         check_fraction("hard_fraction", self.hard_fraction)
+        check_fraction("inflated_fraction", self.inflated_fraction)
         check_at_least("seed", self.seed, 0)
 
     def description(self) -> dict[str, Any]:
@@ -78,6 +85,10 @@ def generate_map_tasks(settings: SyntheticSettings, part: int, number: int) -> T
     rng = np.random.default_rng((settings.seed, part, number))
     while True:
         free = randomized_map(rng, settings.size, settings.generators)
+        if rng.random() < settings.inflated_fraction:
+            free = inflate(free, float(rng.uniform(1, settings.size / 32)))
+            if free.mean() < _LEAST_FREE:
+                continue
         points = _sample_points(free, rng)
         fields = np.stack([distance_field(free, (u, v)) for u, v in points.tolist()])
         pairs = _choose_pairs(points, fields, settings, rng)
@@ -87,6 +98,9 @@ def generate_map_tasks(settings: SyntheticSettings, part: int, number: int) -> T
         geodesic_label(fields[i], fields[j], (int(points[j, 0]), int(points[j, 1])))
         for i, j in pairs
     ]
+    directions = [
+        travel_directions(fields[j], label) for (_, j), label in zip(pairs, labels, strict=True)
+    ]
     endpoints = (points[np.array(pairs)] + 0.5).astype(np.float32)
     return Tasks(
         free[None].astype(np.uint8),
@@ -94,6 +108,7 @@ def generate_map_tasks(settings: SyntheticSettings, part: int, number: int) -> T
         endpoints[:, 0].copy(),
         endpoints[:, 1].copy(),
         np.stack(labels).astype(np.float16),
+        np.stack(directions).astype(np.float16),
     )
 
 
@@ -105,6 +120,7 @@ def concatenate_tasks(map_tasks: Sequence[Tasks]) -> Tasks:
         np.concatenate([tasks.start for tasks in map_tasks]),
         np.concatenate([tasks.goal for tasks in map_tasks]),
         np.concatenate([tasks.region for tasks in map_tasks]),
+        np.concatenate([tasks.direction for tasks in map_tasks if tasks.direction is not None]),
     )
 
 

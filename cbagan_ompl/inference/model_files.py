@@ -43,6 +43,8 @@ MAX_SCRIPT_BYTES = 2**28
 #: Methods of a module that is exported in parts, see
 #: :class:`cbagan_ompl.networks.export_model.SplitModel`; ``forward`` is all of them together.
 SPLIT_METHODS = ("read_map", "encode", "paint")
+#: The same of :class:`cbagan_ompl.networks.export_model.PassageModel`.
+PASSAGE_METHODS = ("read_map", "paint")
 
 #: Most characters of a model's name.
 MAX_NAME_LENGTH = 100

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .graphs import Graphs
-from .model_files import SPLIT_METHODS
 
 
 class KeptMaps(NamedTuple):
@@ -24,6 +23,20 @@ class KeptMaps(NamedTuple):
     arrays: Sequence[NDArray[Any]]
 
 
+class Painting(NamedTuple):
+    """What a network paints, at the size of the maps that it has read.
+
+    Attributes:
+        region: the probability of the region, (B, H, W).
+        directions: of travel, (B, 2, h, w): unit vectors (u, v), u right and v down, in equal
+            patches of the map (beyond whose edges they may reach); 0 where unknown. None of
+            networks that paint none.
+    """
+
+    region: NDArray[np.float32]
+    directions: NDArray[np.float32] | None = None
+
+
 class WholePipeline:
     """A model that is one function: ``forward``.
 
@@ -34,18 +47,19 @@ class WholePipeline:
     def __init__(self, graphs: Graphs) -> None:
         self.graphs = graphs
 
-    def read_maps(self, free: NDArray[np.bool_]) -> KeptMaps:
+    def read_maps(self, free: NDArray[np.bool_], full: NDArray[np.bool_] | None = None) -> KeptMaps:
         """Return what depends on the maps alone.
 
         Args:
             free: (B, H, W), true where free; or (1, H, W) for several tasks on one map.
+            full: the one map before it was scaled; without use here.
         """
         return KeptMaps((free.shape[1], free.shape[2]), [_as_cells(free)])
 
-    def probabilities(
+    def paint(
         self, maps: KeptMaps, start: NDArray[np.floating], goal: NDArray[np.floating]
-    ) -> NDArray[np.float32]:
-        """Return the probability of the region, (B, H, W).
+    ) -> Painting:
+        """Return what the network paints for tasks.
 
         Args:
             maps: from :meth:`read_maps`.
@@ -53,7 +67,7 @@ class WholePipeline:
             goal: (B, 2), the same.
         """
         free = np.repeat(maps.arrays[0], len(start) // len(maps.arrays[0]), axis=0)
-        return self.graphs.call("forward", free, start, goal)[0][:, 0]
+        return Painting(self.graphs.call("forward", free, start, goal)[0][:, 0])
 
 
 class WavefrontPipeline:
@@ -71,30 +85,20 @@ class WavefrontPipeline:
         self.graphs = graphs
         self._distance_fields = distance_fields
 
-    def read_maps(self, free: NDArray[np.bool_]) -> KeptMaps:
+    def read_maps(self, free: NDArray[np.bool_], full: NDArray[np.bool_] | None = None) -> KeptMaps:
         """Return what depends on the maps alone, see :meth:`WholePipeline.read_maps`."""
         shape = free.shape[1], free.shape[2]
         return KeptMaps(shape, self.graphs.call("read_map", _as_cells(free)))
 
-    def probabilities(
+    def paint(
         self, maps: KeptMaps, start: NDArray[np.floating], goal: NDArray[np.floating]
-    ) -> NDArray[np.float32]:
-        """Return the probability of the region, see :meth:`WholePipeline.probabilities`."""
+    ) -> Painting:
+        """Return what the network paints for tasks, see :meth:`WholePipeline.paint`."""
         edges, cells, features = self.graphs.call("encode", maps.arrays, start, goal)
         distances = self._distance_fields(edges, cells)
         painted = self.graphs.call("paint", maps.arrays, features, distances)[0]
         height, width = maps.shape
-        return painted[:, 0, :height, :width]
-
-
-#: Any of them.
-Pipeline = WholePipeline | WavefrontPipeline
-
-
-def make_pipeline(graphs: Graphs) -> Pipeline:
-    """Return the pipeline for the functions that a model has."""
-    is_split = all(map(graphs.has, SPLIT_METHODS))
-    return WavefrontPipeline(graphs) if is_split else WholePipeline(graphs)
+        return Painting(painted[:, 0, :height, :width])
 
 
 def _as_cells(free: NDArray[np.bool_]) -> NDArray[np.float32]:

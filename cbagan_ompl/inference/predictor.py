@@ -25,11 +25,12 @@ from ..sampling.guarantee import Guarantee
 from ..sampling.heatmap import Heatmap
 from ..sampling.robot_heatmaps import on_positions
 from .bundled_models import find_model
+from .choice import make_pipeline
 from .graphs import TorchGraphs
 from .model_files import read_model
 from .model_loading import RUNTIMES, load_functions, prepare_runtime
 from .onnx_graphs import OnnxGraphs
-from .pipelines import KeptMaps, make_pipeline
+from .pipelines import KeptMaps, Painting
 from .scaling import scaled_map, scaled_shape
 
 if TYPE_CHECKING:
@@ -42,6 +43,9 @@ _LEAST_VALUE = 2.0**-5
 
 # Of free space where the network paints nothing at all, so that the heat map can be sampled.
 _FLOOR = 1e-4
+
+# Side of the patches in which directions are painted, in pixels.
+_PATCH = 4
 
 # Tasks in one pass of the network: more are no quicker, and take memory.
 _BATCH = 8
@@ -236,8 +240,8 @@ class Predictor:
         scale = shape[1] / grid.width, shape[0] / grid.height
         pixels = grid.to_pixel(np.array(tasks))
         maps, endpoints = self._read_grid(grid, shape), pixels * scale
-        outputs = self._run(maps, endpoints[:, 0], endpoints[:, 1])
-        heatmaps = [_make_heatmap(values, grid) for values in outputs]
+        painting = self._run(maps, endpoints[:, 0], endpoints[:, 1])
+        heatmaps = [_make_heatmap(painting, i, grid) for i in range(len(tasks))]
         if not repair:
             return heatmaps
         heatmaps = [connect(heatmap, pair) for heatmap, pair in zip(heatmaps, pixels, strict=True)]
@@ -261,29 +265,30 @@ class Predictor:
         Raises:
             ModelError: there is not enough memory.
         """
-        return self._run(self._read_maps(free), start, goal)
+        return self._run(self._read_maps(free), start, goal).region
 
     def _read_grid(self, grid: GridMap, shape: tuple[int, int]) -> KeptMaps:
         """Return a map at a size as the network has read it; a second task does not pay for it."""
         kept = self._kept.get(grid)
         if kept is None or kept.shape != shape:
-            kept = self._kept[grid] = self._read_maps(scaled_map(grid, shape)[None])
+            full = None if shape == grid.shape else grid.free
+            kept = self._kept[grid] = self._read_maps(scaled_map(grid, shape)[None], full)
         return kept
 
-    def _read_maps(self, free: NDArray[np.bool_]) -> KeptMaps:
+    def _read_maps(
+        self, free: NDArray[np.bool_], full: NDArray[np.bool_] | None = None
+    ) -> KeptMaps:
         with _translate_lack_of_memory(free.shape), self._graphs.ready():
-            return self._pipeline.read_maps(free)
+            return self._pipeline.read_maps(free, full)
 
     def _run(
         self, maps: KeptMaps, start: NDArray[np.floating], goal: NDArray[np.floating]
-    ) -> NDArray[np.float32]:
-        """Return the probabilities for tasks on maps, (B, H, W)."""
+    ) -> Painting:
+        """Return what the network paints for tasks on maps."""
         self._graphs.threads = self.inference_threads
         shape = len(start), *maps.shape
         with _translate_lack_of_memory(shape), self._graphs.ready():
-            return self._pipeline.probabilities(
-                maps, start.astype(np.float32), goal.astype(np.float32)
-            )
+            return self._pipeline.paint(maps, start.astype(np.float32), goal.astype(np.float32))
 
     def __repr__(self) -> str:
         return (
@@ -308,9 +313,12 @@ def _list_points(name: str, points: Iterable[ArrayLike]) -> list[ArrayLike]:
         raise TaskError(f"{name} is a list of points (x, y), got {show(points)}") from error
 
 
-def _make_heatmap(values: NDArray[np.float32], grid: GridMap) -> Heatmap:
-    """Return the heat map of a network's output."""
+def _make_heatmap(painting: Painting, task: int, grid: GridMap) -> Heatmap:
+    """Return the heat map of one of the tasks that a network has painted."""
     from ..sampling.painting import paint_heatmap  # here, since numba takes long to import
 
-    painted = paint_heatmap(values, grid, _LEAST_VALUE)
-    return painted or Heatmap(np.full(grid.shape, _FLOOR, np.float32), grid)
+    height, width = painting.region.shape[1:]
+    directions = None if painting.directions is None else painting.directions[task]
+    patches = height / _PATCH, width / _PATCH
+    heatmap = paint_heatmap(painting.region[task], grid, _LEAST_VALUE, directions, patches)
+    return heatmap or Heatmap(np.full(grid.shape, _FLOOR, np.float32), grid)

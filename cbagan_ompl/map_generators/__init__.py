@@ -15,6 +15,13 @@ import numpy as np
 
 from ..errors import ConfigError
 from .buildings import maze, rooms, warehouse
+from .fine_structures import (
+    fine_maze,
+    random_pixels,
+    reduced_map,
+    scanned_map,
+    slanted_walls,
+)
 from .floor_plans import cell_maze, halls, offices, room_grid, shelves
 from .obstacles import (
     blocks,
@@ -50,14 +57,19 @@ MAP_GENERATORS: dict[str, Callable[[np.random.Generator, int, int], Mask]] = {
     "clutter": clutter,
     "curved_walls": curved_walls,
     "ellipses": ellipses,
+    "fine_maze": fine_maze,
     "halls": halls,
     "maze": maze,
     "narrow_passage": narrow_passage,
     "offices": offices,
     "race_track": race_track,
+    "random_pixels": random_pixels,
+    "reduced_map": reduced_map,
     "room_grid": room_grid,
     "rooms": rooms,
+    "scanned_map": scanned_map,
     "shelves": shelves,
+    "slanted_walls": slanted_walls,
     "tl_shapes": tl_shapes,
     "triangles": triangles,
     "walls_with_gaps": walls_with_gaps,

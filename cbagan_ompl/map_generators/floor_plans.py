@@ -26,9 +26,7 @@ def cell_maze(rng: np.random.Generator, width: int, height: int) -> Mask:
     pitch = sample_scale(rng, 4, min(width, height) / 4)
     wall = int(rng.integers(1, max(2, round(0.45 * pitch))))
     loops = 0.0 if rng.random() < 0.5 else rng.uniform(0.02, 0.3)
-    return _generate_cells(
-        rng, width, height, pitch, wall, pitch, loops, winding=rng.random() < 0.6
-    )
+    return generate_cells(rng, width, height, pitch, wall, pitch, loops, winding=rng.random() < 0.6)
 
 
 def room_grid(rng: np.random.Generator, width: int, height: int) -> Mask:
@@ -39,7 +37,7 @@ def room_grid(rng: np.random.Generator, width: int, height: int) -> Mask:
     pitch = sample_scale(rng, 10, min(width, height) / 2.5)
     wall = int(rng.integers(1, max(2, pitch // 5)))
     door = int(rng.integers(2, max(3, pitch // 3)))
-    return _generate_cells(
+    return generate_cells(
         rng, width, height, pitch, wall, door, rng.uniform(0.1, 0.9), winding=False
     )
 
@@ -104,7 +102,7 @@ def halls(rng: np.random.Generator, width: int, height: int) -> Mask:
     return fill_pockets(free)
 
 
-def _generate_cells(
+def generate_cells(
     rng: np.random.Generator,
     width: int,
     height: int,

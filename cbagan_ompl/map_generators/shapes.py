@@ -145,6 +145,21 @@ def fill_pockets(free: Mask) -> Mask:
     return np.asarray(labels == 1 + int(sizes.argmax()))
 
 
+def inflate(free: Mask, radius: float) -> Mask:
+    """Return the map with obstacles inflated by a radius, and without the pockets that this makes.
+
+    Args:
+        free: the map.
+        radius: in pixels, at least 1.
+
+    Example:
+        >>> inflate(np.array([[True, True, True, False]]), 1).tolist()
+        [[True, True, False, False]]
+    """
+    distance = cv2.distanceTransform(free.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    return fill_pockets(distance > radius)
+
+
 def sample_scale(rng: np.random.Generator, least: float, most: float) -> int:
     """Sample a length in whole pixels, log-uniform between two bounds."""
     return round(float(np.exp(rng.uniform(np.log(least), np.log(max(least, most))))))

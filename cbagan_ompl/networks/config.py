@@ -151,6 +151,8 @@ class NetworkConfig:
         noise_stem: channels of the noise stem of the paper's generator.
         cost_maps: learned cost maps of the wavefront of a generator with patches; 0 for no
             wavefront.
+        passages: the generator learns costs of travel and finds the distances from start and goal
+            exactly (:mod:`.passages`), and paints directions of travel; ``patch`` is 4.
         channel_attention: use channel attention (in all three networks).
         spatial_attention: use spatial attention (in all three networks).
         self_attention: use the self-attention of SAGAN (in all three networks).
@@ -171,6 +173,7 @@ class NetworkConfig:
     patch: int = 1
     noise_stem: int = 32
     cost_maps: int = 0
+    passages: bool = False
     channel_attention: bool = True
     spatial_attention: bool = True
     self_attention: bool = False
@@ -179,8 +182,11 @@ class NetworkConfig:
 
     def __post_init__(self) -> None:
         check_types(self, {field.name: field.default for field in fields(self)})
-        if len(self.widths) < 3 or min(self.widths) < 1:
-            raise ConfigError(f"widths are three or more positive numbers, got {show(self.widths)}")
+        least, text = (2, "two") if self.passages else (3, "three")
+        if len(self.widths) < least or min(self.widths) < 1:
+            raise ConfigError(
+                f"widths are {text} or more positive numbers, got {show(self.widths)}"
+            )
         if len(self.widths) > _MAX_STAGES or max(self.widths) > _MAX_WIDTH:
             raise ConfigError(
                 f"widths are at most {_MAX_STAGES} numbers of at most {_MAX_WIDTH}, got "
@@ -194,6 +200,8 @@ class NetworkConfig:
         check_values(self, RULES)
         if self.patch == 1:
             check_values(self, _RULES_WITHOUT_PATCHES)
+        if self.passages:
+            check_values(self, _RULES_OF_PASSAGES)
 
     def variant(self, name: str) -> NetworkConfig:
         """Return this architecture with the changes of one of :data:`NETWORKS`.
@@ -229,3 +237,7 @@ RULES = {
 
 _LEFT_OUT = Rule(lambda value: not value, "left out where patch is 1")
 _RULES_WITHOUT_PATCHES = {"cost_maps": _LEFT_OUT, "white_obstacles": _LEFT_OUT}
+_RULES_OF_PASSAGES = {
+    "patch": Rule(lambda value: value == 4, "4 with passages"),
+    "cost_maps": Rule(lambda value: value == 0, "0 with passages, which have costs of their own"),
+}

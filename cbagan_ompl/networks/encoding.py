@@ -81,6 +81,24 @@ def spot(point: Tensor, height: int, width: int, radius: float = SPOT_RADIUS) ->
     return torch.clamp(radius + 0.5 - distance, 0.0, 1.0)
 
 
+def spot_centres(image: Tensor) -> tuple[Tensor, Tensor]:
+    """Return start and goal of a point image: the inverse of :func:`point_image`.
+
+    Args:
+        image: (B, 3, H, W) in [-1, 1].
+
+    Returns:
+        (B, 2) each, pixel coordinates (u, v), exact but for spots that the image cuts off.
+    """
+    spots = 0.5 - 0.5 * image.float()
+    columns = torch.arange(image.size(3), dtype=torch.float32, device=image.device) + 0.5
+    rows = torch.arange(image.size(2), dtype=torch.float32, device=image.device) + 0.5
+    mass = spots.sum((2, 3))
+    across, down = (spots.sum(2) * columns).sum(2) / mass, (spots.sum(3) * rows).sum(2) / mass
+    points = torch.stack((across, down), 2)
+    return points[:, 0], points[:, 2]
+
+
 def region_image(region: Tensor) -> Tensor:
     """Return a region as the image that the generator learns to produce: green on white.
 

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import torch
 from torch import Tensor, nn
-from torch.nn import functional
 
 from .encoding import SPOT_RADIUS, map_image, point_image, region_probability
 from .generator import Generator
+from .passage_generator import PassageGenerator
+from .passage_model import PassageModel
 from .patch_generator import PatchGenerator, endpoint_cells
+from .tiles import make_free_stem, make_linear, pad_to_stride, tiles_of
+
+#: The generators.
+AnyGenerator = Generator | PatchGenerator | PassageGenerator
 
 
 class RegionModel(nn.Module):
@@ -42,11 +47,7 @@ class RegionModel(nn.Module):
 
     def padded(self, free: Tensor) -> Tensor:
         """Return a map with blocked pixels to the right and below, up to the stride."""
-        right, below = -free.size(3) % self.stride, -free.size(2) % self.stride
-        # A graph for ONNX is traced: it has no branches.
-        if torch.jit.is_scripting() and right == 0 and below == 0:  # type: ignore[attr-defined]
-            return free
-        return functional.pad(free, [0, right, 0, below])
+        return pad_to_stride(free, self.stride)
 
 
 class SplitModel(RegionModel):
@@ -97,8 +98,10 @@ class SplitModel(RegionModel):
         return probability
 
 
-def make_region_model(generator: Generator | PatchGenerator) -> RegionModel:
+def make_region_model(generator: AnyGenerator) -> RegionModel | PassageModel:
     """Return what is exported of a generator with its trained weights, in evaluation mode."""
+    if isinstance(generator, PassageGenerator):
+        return PassageModel(generator).eval()
     is_split = isinstance(generator, PatchGenerator) and generator.wavefront is not None
     return (SplitModel if is_split else RegionModel)(generator).eval()
 
@@ -139,7 +142,7 @@ class PatchModel(nn.Module):
         # The spot of a point touches no more cells than that in a row, and no map has fewer.
         self.window = 3
         self.reach = SPOT_RADIUS + 0.5
-        self.map_stem = _make_free_stem(generator.map_stem)
+        self.map_stem = make_free_stem(generator.map_stem)
         self.point_stem = _make_point_stem(generator.point_stem, generator.noise_stem)
         white = self.point_stem(torch.ones(1, 1, 1, self.point_stem.in_features))
         self.white_features = nn.Parameter(white.detach().permute(0, 3, 1, 2), requires_grad=False)
@@ -226,39 +229,8 @@ class PatchModel(nn.Module):
         return features, cells.view(batch, 2, height, width)
 
 
-def tiles_of(images: Tensor, size: int) -> Tensor:
-    """Return the square tiles of images, with all values of a tile in one row.
-
-    Args:
-        images: (B, C, H, W), H and W multiples of ``size``.
-        size: of a tile, in pixels.
-
-    Returns:
-        (B, H / size, W / size, C size^2): channel by channel, row by row.
-    """
-    batch, channels, height, width = images.shape
-    split = images.view(batch, channels, height // size, size, width // size, size)
-    return split.permute(0, 2, 4, 1, 3, 5).flatten(3)
-
-
-def _make_free_stem(stem: nn.Conv2d) -> nn.Linear:
-    """Return a map stem that reads the pixels of a patch, 1 where free, not three colours."""
-    assert stem.bias is not None
-    return _make_linear(2 * stem.weight.sum(1), stem.bias - stem.weight.sum((1, 2, 3)))
-
-
 def _make_point_stem(stem: nn.Conv2d, noise_stem: nn.Conv2d) -> nn.Linear:
     """Return a point stem that reads tiles, with the output of the noise stem for no noise."""
     assert stem.bias is not None
     assert noise_stem.bias is not None
-    return _make_linear(stem.weight, stem.bias + noise_stem.bias)
-
-
-def _make_linear(weight: Tensor, bias: Tensor) -> nn.Linear:
-    """Return the layer that does to the tiles of :func:`tiles_of` what a convolution does."""
-    flat = weight.flatten(1)
-    linear = nn.Linear(flat.size(1), flat.size(0))
-    with torch.no_grad():
-        linear.weight.copy_(flat)
-        linear.bias.copy_(bias)
-    return linear
+    return make_linear(stem.weight, stem.bias + noise_stem.bias)

@@ -8,7 +8,9 @@ from ..errors import ConfigError
 from .attention import Attention
 from .config import MAX_WEIGHTS, NetworkConfig
 from .discriminator import Discriminator
+from .export_model import AnyGenerator
 from .generator import Generator
+from .passage_generator import PassageGenerator
 from .patch_generator import PatchGenerator
 
 
@@ -33,7 +35,7 @@ def check_weights(config: NetworkConfig) -> None:
         )
 
 
-def make_generator(config: NetworkConfig) -> Generator | PatchGenerator:
+def make_generator(config: NetworkConfig) -> AnyGenerator:
     """Return the generator of a configuration.
 
     Example:
@@ -43,6 +45,8 @@ def make_generator(config: NetworkConfig) -> Generator | PatchGenerator:
     attention = attention_of(config)
     if config.patch == 1:
         return Generator(config.widths, attention, config.stem, config.noise_stem)
+    if config.passages:
+        return PassageGenerator(config.widths, attention, config.stem, config.white_obstacles)
     return PatchGenerator(
         config.widths,
         attention,

@@ -4,41 +4,34 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import replace
 from types import TracebackType
 from typing import Any
 
 from ..errors import PlannerError
-from ..sampling.adaptation import AdaptiveMixture
 from ..sampling.checks import check_heatmap
-from ..sampling.headings import HeadingSampler
 from ..sampling.heatmap import Heatmap
 from ..sampling.options import OPTIMIZING_SHARPNESS, SamplerOptions
-from ..sampling.roadmap import RoadmapMixture
 from ..sampling.sampler import HeatmapSampler
 from . import compat
 from .attachable import check_task, planner_of, setup_of, warn_of_single_controls
-from .bounds_steering import SteeringMonitor
+from .awaited import AwaitedHeatmap, result_of
 from .goal_monitor import goal_monitor
 from .hooks import (
     BOUNDS_STEERING,
     GOAL_INJECTION,
+    check_switchable,
     hook_of,
     needs_directed_controls,
-    samples_are_nodes,
     wants_sharp,
 )
 from .installation import Wiring, install
 from .monitor import PlannerMonitor, release_forgotten
-from .planner_kinds import class_name, plans_controls
-from .pose_headings import with_headings
-from .sample_budget import budget_of, needs_many_poses
-from .states import drives_backwards, position_bounds, state_access
-
-# OMPL's range of a planner that was given none, as a fraction of the extent of the space.
-_OMPL_RANGE = 0.2
-# How far around a node its tree is taken to be, as a fraction of the range.
-_REACH = 0.8
+from .planner_kinds import class_name
+from .sampler_making import SamplerMaker
+from .states import StateAccess, state_access
+from .steering_monitor import SteeringMonitor
 
 # The hooks whose callbacks see the planner's tree, each with what watches it.
 _MONITORS = {GOAL_INJECTION: goal_monitor, BOUNDS_STEERING: SteeringMonitor}
@@ -70,7 +63,7 @@ class Attachment:
     def __init__(
         self,
         hook: str,
-        sampler: HeatmapSampler,
+        source: HeatmapSampler | AwaitedHeatmap,
         monitor: PlannerMonitor,
         goal: Any,
         undo: Callable[[], None],
@@ -78,14 +71,46 @@ class Attachment:
         self.hook = hook
         # Kept, because whoever plans to it does not keep it.
         self._goal = goal
-        self._sampler = sampler
+        self._source = source
         self._monitor = monitor
         self._undo: Callable[[], None] | None = undo
 
     @property
     def sample_counts(self) -> dict[str, int]:
-        """Samples that the planner has had so far: ``{"learned": n, "uniform": m}``."""
-        return self._sampler.sample_counts
+        """Samples that the planner has had so far: ``{"learned": n, "uniform": m}``.
+
+        Both are 0 while the heat map is waited for: samples are OMPL's own then.
+        """
+        sampler = self._sampler
+        return {"learned": 0, "uniform": 0} if sampler is None else sampler.sample_counts
+
+    @property
+    def heatmap(self) -> Heatmap | None:
+        """What is sampled; None while it is waited for."""
+        sampler = self._sampler
+        return None if sampler is None else sampler.heatmap
+
+    @property
+    def arrival_s(self) -> float | None:
+        """Seconds from ``attach`` until the planner began to sample a heat map that was waited for.
+
+        It is 0 for one that was there, and None while it is waited for.
+        """
+        source = self._source
+        return source.arrival_s if isinstance(source, AwaitedHeatmap) else 0.0
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether a heat map that was waited for could not be made."""
+        source = self._source
+        return (
+            isinstance(source, AwaitedHeatmap) and source.is_pending() and source.error is not None
+        )
+
+    @property
+    def _sampler(self) -> HeatmapSampler | None:
+        source = self._source
+        return source.sampler if isinstance(source, AwaitedHeatmap) else source
 
     def detach(self) -> None:
         """Give the planner back as it was before.
@@ -127,7 +152,10 @@ class Attachment:
 
 
 def attach(
-    setup: Any, heatmap: Heatmap, options: SamplerOptions | None = None, **changes: Any
+    setup: Any,
+    heatmap: Heatmap | Future[Heatmap],
+    options: SamplerOptions | None = None,
+    **changes: Any,
 ) -> Attachment:
     """Make a planner sample a heat map.
 
@@ -149,6 +177,8 @@ def attach(
             watched on OMPL 2.0: a goal that is replaced while it is attached is not noticed there.
         heatmap: what to sample, in the coordinates of the setup's space. Where states have a yaw
             and the heat map no headings, those of :meth:`.Heatmap.directed` to the goal are taken.
+            A future of it, whose thread makes it meanwhile: the planner samples on its own until it
+            is there. If it fails, the solve of the setup raises that when it has ended.
         options: how samples follow the heat map. ``sharpness`` None stands for 1 with planners that
             stop at their first path other than RRTConnect, and for
             :data:`cbagan_ompl.sampling.options.OPTIMIZING_SHARPNESS` with those that go on.
@@ -166,7 +196,8 @@ def attach(
     Raises:
         PlannerError: ``setup`` is neither, no planner is set, no hook of this build reaches it, it
             is written in Python, it samples a heat map already, its space has no (x, y), the start
-            or goal is missing, or the goal cannot be sampled.
+            or goal is missing, the goal cannot be sampled, or the heat map is a future and the
+            planner makes all its samples at once, at the beginning.
         TaskError: the start is outside or in an obstacle of the heat map's map.
         HeatmapError: not a :class:`Heatmap`, or one that is 0 everywhere in the bounds of the
             space.
@@ -189,45 +220,40 @@ def attach(
         ('goal-injection', True)
     """
     options = SamplerOptions.of(options, changes)
-    check_heatmap(heatmap)
+    if isinstance(heatmap, Future) and heatmap.done():
+        heatmap = result_of(heatmap)
+    is_awaited = isinstance(heatmap, Future)
+    if not is_awaited:
+        check_heatmap(heatmap)
     setup = setup_of(setup)
     planner = planner_of(setup)
     name = class_name(planner)
     hook = hook_of(name)
+    if is_awaited:
+        check_switchable(name)
     if needs_directed_controls(name):
         warn_of_single_controls(planner)
     if options.sharpness is None:
         sharpness = OPTIMIZING_SHARPNESS if wants_sharp(name) else 1.0
         options = replace(options, sharpness=sharpness)
-    rng = options.generator()
-    space = setup.getStateSpace()
     release_forgotten()
-    starts = check_task(setup, heatmap, state_access(space))
-    heatmap = with_headings(setup, heatmap, options.heading)
-    headings = HeadingSampler(heatmap, options.heading, rng, drives_backwards(space))
-    states = state_access(space, headings)
+    states: StateAccess = state_access(setup.getStateSpace())
+    starts = check_task(setup, states)
     monitor = _MONITORS.get(hook, PlannerMonitor)(setup, states)
-    adaptation, budget = options.adaptation, None
-    if adaptation.stagnation:
-        budget = budget_of(planner, sees_nodes=hook in _MONITORS)
-    if needs_many_poses(planner):  # what is no progress in position may be one in heading
-        adaptation = replace(adaptation, stagnation=False)
-    mixture: AdaptiveMixture | RoadmapMixture | None = None
-    if hook in _MONITORS:  # callbacks see the tree
-        reach = _reach_of(planner)
-        mixture = AdaptiveMixture(heatmap, adaptation, reach, monitor, budget)
-    elif samples_are_nodes(name) and adaptation.coverage:
-        mixture = RoadmapMixture(heatmap, _reach_of(planner), budget)
-    sampler = HeatmapSampler(heatmap, replace(options, seed=rng), monitor, mixture, budget)
-    sampler.keep_inside(*position_bounds(space))
+    maker = SamplerMaker(name, hook, options, monitor, starts, options.generator())
+    source: HeatmapSampler | AwaitedHeatmap
+    awaited = None
+    if isinstance(heatmap, Future):
+        source = awaited = AwaitedHeatmap(heatmap, maker.make_late)
+    else:
+        made = maker.make(heatmap)
+        assert made is not None, "the setup is there"
+        source, states = made
     # Samplers and solutions that are there already would keep the planner from asking for samples.
     compat.clear_planner(planner)
     setup.getProblemDefinition().clearSolutionPaths()
-    undo_hook = install(hook, Wiring(setup, planner, name, states, sampler, monitor))
-    monitor.register()
-    sampler.prepare()
-    if mixture is not None and options.adaptation.connectivity:
-        monitor.prepare(heatmap, starts)
+    undo_hook = install(hook, Wiring(setup, planner, name, states, source, monitor))
+    monitor.register(awaited)
 
     def undo() -> None:
         # First: a planner without samplers makes none while its options change. One that has not
@@ -237,17 +263,4 @@ def attach(
         monitor.release()
         undo_hook()
 
-    return Attachment(hook, sampler, monitor, setup.getGoal(), undo)
-
-
-def _reach_of(planner: Any) -> float:
-    """Return how far around a node a tree need not grow again, world units: most of its range.
-
-    Where controls are planned it is 0: what is near in position may be far on the way.
-    """
-    if plans_controls(planner):
-        return 0.0
-    # Before its setup a planner may have no range yet; OMPL then takes a fraction of the space.
-    si = planner.getSpaceInformation()
-    range = planner.getRange() if hasattr(planner, "getRange") else 0.0
-    return _REACH * float(range or _OMPL_RANGE * si.getMaximumExtent())
+    return Attachment(hook, source, monitor, setup.getGoal(), undo)

@@ -136,18 +136,16 @@ def warn_of_single_controls(planner: Any) -> None:
     )
 
 
-def check_task(setup: Any, heatmap: Heatmap, states: StateAccess) -> list[tuple[float, float]]:
+def check_task(setup: Any, states: StateAccess) -> list[tuple[float, float]]:
     """Return the positions of the start states, or raise if a heat map cannot serve the task.
 
     Args:
         setup: from :func:`setup_of`, with its planner.
-        heatmap: what is to be sampled.
         states: access to the positions of its states.
 
     Raises:
         PlannerError: the start or the goal is missing, the goal cannot be sampled, or the planner
             is attached already.
-        TaskError: no start is on free space of the heat map's map.
     """
     problem, goal = setup.getProblemDefinition(), setup.getGoal()
     if goal is None or problem.getStartStateCount() == 0:
@@ -161,10 +159,21 @@ def check_task(setup: Any, heatmap: Heatmap, states: StateAccess) -> list[tuple[
         raise PlannerError(
             "this planner samples a heat map already: call detach() of its attachment first"
         )
-    starts = compat.valid_starts(problem, setup.getSpaceInformation(), states.read)
+    return compat.valid_starts(problem, setup.getSpaceInformation(), states.read)
+
+
+def check_frames(starts: list[tuple[float, float]], heatmap: Heatmap) -> None:
+    """Raise if the heat map and the task are not in the same coordinates.
+
+    Args:
+        starts: positions of the start states.
+        heatmap: what is to be sampled.
+
+    Raises:
+        TaskError: no start is on free space of the heat map's map.
+    """
     if starts and not heatmap.grid.is_free(np.array(starts)).any():
         _raise_frames(starts[0], heatmap)
-    return starts
 
 
 def _raise_frames(start: tuple[float, float], heatmap: Heatmap) -> None:

@@ -25,11 +25,11 @@ from types import FrameType
 from typing import Any
 
 from ..common.signals import ENDING
-from ..errors import PlannerError
 from ..sampling.sampler import HeatmapSampler
-from .compat import ob, plane_bounds, planner_data
-from .monitor import PlannerMonitor
+from .awaited import AwaitedHeatmap
+from .compat import ob, plane_bounds
 from .states import StateAccess, position_space
+from .steering_monitor import SteeringMonitor
 
 # Nodes of the goal's tree from which on RRTConnect asks for further goal states in each iteration.
 _ASKING_SIZE = 4
@@ -38,61 +38,33 @@ _ASKING_SIZE = 4
 _SHORT_STEP = 0.01
 
 
-class SteeringMonitor(PlannerMonitor):
-    """The monitor of a planner whose samples are steered by the bounds of its space."""
-
-    def set_injected_fraction(self, fraction: float) -> None:
-        """Steer no more than a fraction of the samples."""
-        self.injected_fraction = fraction
-
-    def has_begun(self) -> bool:
-        """Return whether the planner stands at the beginning of a first solve."""
-        if self._planner is None:
-            return False
-        data = planner_data(self._planner)
-        return bool(data.numStartVertices() > 0 and data.numGoalVertices() == 0)
-
-    def check_wiring(self) -> None:
-        """Raise if the setup has other checks than when the planner was attached.
-
-        Raises:
-            PlannerError: the validity checker or the motion validator has been replaced.
-        """
-        if self._setup is None:
-            return
-        si = self._setup.getSpaceInformation()
-        checks = si.getStateValidityChecker(), si.getMotionValidator()
-        if not all(getattr(check, "is_steered", False) for check in checks):
-            raise PlannerError(
-                "the validity checker or the motion validator was replaced while the planner "
-                "samples a heat map: call detach(), set it, and attach again"
-            )
-
-    def range(self) -> float:
-        """Return the longest edge of the planner's trees."""
-        return float(self._planner.getRange())
-
-    def set_range(self, range: float) -> None:
-        """Set the longest edge of the planner's trees."""
-        self._planner.setRange(range)
-
-
 class BoundsSteering:
     """Hand a sample to a planner by the bounds of its space, and set them back.
 
     Args:
         space: of the planner.
         states: access to the positions of its states.
-        sampler: of the heat map; it is told of every node of the trees.
+        source: the sampler of the heat map, which is told of every node of the trees; or the heat
+            map that is waited for, until which nothing is steered.
         monitor: of the planner.
     """
 
     def __init__(
-        self, space: Any, states: StateAccess, sampler: HeatmapSampler, monitor: SteeringMonitor
+        self,
+        space: Any,
+        states: StateAccess,
+        source: HeatmapSampler | AwaitedHeatmap,
+        monitor: SteeringMonitor,
     ) -> None:
         self._space = position_space(space)
         self._read = states.read
-        self._sampler = sampler
+        self._awaited: AwaitedHeatmap | None = None
+        self._sampler: HeatmapSampler
+        if isinstance(source, AwaitedHeatmap):
+            self._awaited = source
+            source.hand_to(self._follow)
+        else:
+            self._sampler = source
         self._monitor = monitor
         self._point = ob.RealVectorBounds(2)
         self._true = _copy_bounds(self._space.getBounds())
@@ -194,7 +166,8 @@ class BoundsSteering:
         if self._is_ours:
             # The goal's tree grows backwards: its new node is where the motion begins.
             x, y = self._read(from_state if in_goal_tree else to_state)
-            self._sampler.on_new_node(x, y, False)
+            if self._awaited is None:
+                self._sampler.on_new_node(x, y, False)
             self._growth.on_node(in_goal_tree, (x, y))
         return valid
 
@@ -229,7 +202,8 @@ class BoundsSteering:
         self._is_ours = self._monitor.has_begun()
         if self._is_ours:
             self._goals_sampled = 0
-            self._sampler.restart()
+            if self._awaited is None:
+                self._sampler.restart()
             self._growth.begin()
         else:
             self._nodes_before = self._monitor.node_count()
@@ -237,9 +211,12 @@ class BoundsSteering:
 
     def _steer(self, caller: FrameType) -> None:
         """Make the next sample one of ours."""
-        monitor, sampler = self._monitor, self._sampler
+        monitor = self._monitor
         if monitor.is_released:
             return  # detached in the middle of a solve, by one of its callbacks
+        if self._awaited is not None and self._awaited.is_pending():
+            return
+        sampler = self._sampler
         fraction = monitor.injected_fraction
         if fraction < 1 and sampler.chance() >= fraction:
             return
@@ -259,6 +236,10 @@ class BoundsSteering:
         except BaseException:
             self.restore()
             raise
+
+    def _follow(self, sampler: HeatmapSampler, states: StateAccess) -> None:
+        """Steer samples of a heat map from now on."""
+        self._sampler, self._awaited = sampler, None
 
     def guard_signals(self) -> None:
         """Let handlers of signals that may raise set the bounds back first.

@@ -6,8 +6,9 @@ import sys
 from typing import Any
 
 from ..sampling.sampler import HeatmapSampler
+from .awaited import AwaitedHeatmap
 from .compat import ob
-from .goal_approach import goal_approach
+from .goal_approach import GoalApproach, goal_approach
 from .goal_monitor import GoalMonitor
 from .states import StateAccess
 
@@ -29,7 +30,8 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
         si: the space information.
         original: the goal of the task.
         states: access to the positions of the states.
-        sampler: of the heat map; it is told of every node of the tree.
+        source: the sampler of the heat map, which is told of every node of the tree; or the heat
+            map that is waited for, until which the goal is as the original.
         monitor: of the planner.
     """
 
@@ -38,7 +40,7 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
         si: Any,
         original: Any,
         states: StateAccess,
-        sampler: HeatmapSampler,
+        source: HeatmapSampler | AwaitedHeatmap,
         monitor: GoalMonitor,
     ) -> None:
         super().__init__(si)
@@ -46,13 +48,21 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
         self.setThreshold(self._threshold)
         self._original = original
         self._states = states
-        self._sampler = sampler
         self._monitor = monitor
-        self._approach = goal_approach(si.getStateSpace(), sampler)
+        self._awaited: AwaitedHeatmap | None = None
+        self._sampler: HeatmapSampler
+        self._approach: GoalApproach | None = None
+        if isinstance(source, AwaitedHeatmap):
+            self._awaited = source
+            source.hand_to(self._follow)
+        else:
+            self._take(source)
 
     def distanceGoal(self, state: Any) -> float:  # noqa: N802
         """Return the distance to the original goal; planners ask it for every new node."""
         distance: float = self._original.distanceGoal(state)
+        if self._awaited is not None and self._awaited.is_pending():
+            return distance
         monitor = self._monitor
         monitor.nodes += 1
         if monitor.is_trusted:
@@ -65,6 +75,8 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
 
     def maxSampleCount(self) -> int:  # noqa: N802
         """Return a number without limit to the planner, the original's number to other callers."""
+        if self._awaited is not None and self._awaited.is_pending():
+            return int(self._original.maxSampleCount())
         monitor = self._monitor
         monitor.counts_asked += 1
         return _ENDLESS if monitor.is_sampling() else int(self._original.maxSampleCount())
@@ -83,6 +95,10 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
     def sampleGoal(self, state: Any) -> None:  # noqa: N802
         """Sample the heat map for the planner, the original goal for other callers."""
         monitor = self._monitor
+        if self._awaited is not None and self._awaited.is_pending():
+            monitor.note_call(sys._getframe(1))
+            self._original.sampleGoal(state)
+            return
         monitor.check_asker()
         sampling = monitor.takes_sample(sys._getframe(1))
         monitor.counts_asked = 0
@@ -95,6 +111,16 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
             self._approach.move_back(state)
         else:
             self._states.write(state, *self._sampler.next())
+
+    def _take(self, sampler: HeatmapSampler) -> None:
+        self._sampler = sampler
+        self._approach = goal_approach(self.getSpaceInformation().getStateSpace(), sampler)
+
+    def _follow(self, sampler: HeatmapSampler, states: StateAccess) -> None:
+        """Sample a heat map from now on."""
+        self._take(sampler)
+        self._states, self._awaited = states, None
+        self._monitor.set_injected_fraction(1.0)
 
     def _is_goals_turn(self) -> bool:
         """Return whether the true goal is due, as often as with OMPL's own goal bias.

@@ -43,6 +43,7 @@ class PlannerTraits:
             where the goal is written in Python.
         needs_directed_controls: whether its samples are where controls lead to, and nothing else.
             OMPL's default is to try a single control, so that they make no difference.
+        samples_at_once: whether it makes all its samples when its solve begins.
     """
 
     hook: str | None
@@ -56,6 +57,7 @@ class PlannerTraits:
     counts_iterations: bool = False
     asks_in_thread: bool = False
     needs_directed_controls: bool = False
+    samples_at_once: bool = False
 
 
 _ROADMAP: dict[str, Any] = {
@@ -66,11 +68,11 @@ _ROADMAP: dict[str, Any] = {
 
 #: Every geometric planner that some hook reaches on some build, by OMPL's name of its class.
 PLANNERS = {
-    "BFMT": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
+    "BFMT": PlannerTraits(STATE_SAMPLER, stops_at_first=True, samples_at_once=True),
     "BKPIECE1": PlannerTraits(VALID_STATE_SAMPLER, stops_at_first=True),
     "BiEST": PlannerTraits(VALID_STATE_SAMPLER, stops_at_first=True),
     "EST": PlannerTraits(VALID_STATE_SAMPLER, stops_at_first=True),
-    "FMT": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
+    "FMT": PlannerTraits(STATE_SAMPLER, stops_at_first=True, samples_at_once=True),
     "InformedRRTstar": PlannerTraits(GOAL_INJECTION, counts_iterations=True),
     "KPIECE1": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
     "LBKPIECE1": PlannerTraits(STATE_SAMPLER, stops_at_first=True),
@@ -248,6 +250,22 @@ def asks_in_thread(planner: str) -> bool:
 def needs_directed_controls(planner: str) -> bool:
     """Return whether samples matter to a planner only where several controls are tried."""
     return _traits_of(planner).needs_directed_controls
+
+
+def check_switchable(planner: str) -> None:
+    """Raise if a planner cannot begin to sample a heat map in the middle of a solve.
+
+    Args:
+        planner: OMPL's name of it, one that a hook reaches.
+
+    Raises:
+        PlannerError: it makes all its samples at the beginning.
+    """
+    if _traits_of(planner).samples_at_once:
+        raise PlannerError(
+            f"{planner} makes all its samples when its solve begins, so that a heat map that comes "
+            "later is of no use to it: wait for the heat map, without overlap"
+        )
 
 
 def _traits_of(planner: str) -> PlannerTraits:

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..sampling.sampler import HeatmapSampler
 from . import compat, ompl_samplers
-from .bounds_steering import SteeringMonitor
+from .awaited import AwaitedHeatmap
 from .compat import ou
 from .goal_injection import InjectedGoal
 from .goal_monitor import GoalMonitor
@@ -22,6 +22,11 @@ from .hooks import (
 from .monitor import PlannerMonitor, is_informed
 from .states import StateAccess
 from .steered_callbacks import install_steering
+from .steering_monitor import SteeringMonitor
+from .switching_samplers import (
+    switching_state_sampler_allocator,
+    switching_valid_state_sampler_allocator,
+)
 
 
 @dataclass(frozen=True)
@@ -33,7 +38,7 @@ class Wiring:
         planner: of the setup.
         name: of the planner.
         states: access to the positions of its states.
-        sampler: of the heat map.
+        source: the sampler of the heat map, or the heat map that is waited for.
         monitor: of the planner.
     """
 
@@ -41,7 +46,7 @@ class Wiring:
     planner: Any
     name: str
     states: StateAccess
-    sampler: HeatmapSampler
+    source: HeatmapSampler | AwaitedHeatmap
     monitor: PlannerMonitor
 
 
@@ -59,8 +64,12 @@ def install(hook: str, wiring: Wiring) -> Callable[[], None]:
 
 
 def _use_state_sampler(wiring: Wiring) -> Callable[[], None]:
-    space, planner = wiring.setup.getStateSpace(), wiring.planner
-    space.setStateSamplerAllocator(ompl_samplers.state_sampler_allocator(wiring.sampler))
+    space, planner, source = wiring.setup.getStateSpace(), wiring.planner, wiring.source
+    space.setStateSamplerAllocator(
+        switching_state_sampler_allocator(source, wiring.monitor)
+        if isinstance(source, AwaitedHeatmap)
+        else ompl_samplers.state_sampler_allocator(source)
+    )
     restore = _reject_uninformed(planner) if is_informed(planner) else None
     keeps = keeps_sampler(wiring.name)
     if keeps:
@@ -98,8 +107,12 @@ def _reject_uninformed(planner: Any) -> Callable[[], None]:
 
 
 def _use_valid_state_sampler(wiring: Wiring) -> Callable[[], None]:
-    si = wiring.setup.getSpaceInformation()
-    si.setValidStateSamplerAllocator(ompl_samplers.valid_state_sampler_allocator(wiring.sampler))
+    si, source = wiring.setup.getSpaceInformation(), wiring.source
+    si.setValidStateSamplerAllocator(
+        switching_valid_state_sampler_allocator(source, wiring.monitor)
+        if isinstance(source, AwaitedHeatmap)
+        else ompl_samplers.valid_state_sampler_allocator(source)
+    )
     return lambda: compat.clear_valid_state_sampler(si)
 
 
@@ -108,10 +121,11 @@ def _inject_goals(wiring: Wiring) -> Callable[[], None]:
     original, bias = setup.getGoal(), planner.getGoalBias()
     si = setup.getSpaceInformation()
     assert isinstance(wiring.monitor, GoalMonitor)
-    injected = InjectedGoal(si, original, wiring.states, wiring.sampler, wiring.monitor)
+    injected = InjectedGoal(si, original, wiring.states, wiring.source, wiring.monitor)
     setup.setGoal(injected)
     wiring.monitor.injected_goal = injected
-    wiring.monitor.set_injected_fraction(1.0)
+    if not isinstance(wiring.source, AwaitedHeatmap):
+        wiring.monitor.set_injected_fraction(1.0)
 
     def undo() -> None:
         if setup.getGoal() is injected:
@@ -123,7 +137,7 @@ def _inject_goals(wiring: Wiring) -> Callable[[], None]:
 
 def _steer_bounds(wiring: Wiring) -> Callable[[], None]:
     assert isinstance(wiring.monitor, SteeringMonitor)
-    return install_steering(wiring.setup, wiring.states, wiring.sampler, wiring.monitor)
+    return install_steering(wiring.setup, wiring.states, wiring.source, wiring.monitor)
 
 
 _INSTALL = {

@@ -17,6 +17,7 @@ import numpy as np
 from ..errors import PlannerError
 from ..sampling.heatmap import Heatmap
 from ..sampling.informed_set import InformedSet
+from .awaited import AwaitedHeatmap
 from .compat import best_cost, new_state, ob, planner_data, start_states, typed_state
 from .solution_cost import SolutionCost
 from .solve_watch import SolveWatch
@@ -61,6 +62,7 @@ class PlannerMonitor:
         self._call: tuple[CodeType, int, int] | None = None
         self._paths_at_call = 0
         self._watches: list[SolveWatch] = []
+        self._awaited: AwaitedHeatmap | None = None
 
     def note_call(self, caller: FrameType) -> None:
         """Note that OMPL asks for a sample, for :meth:`is_planning`.
@@ -155,11 +157,29 @@ class PlannerMonitor:
         if self._planner is not None:
             self._planner.setGoalBias(fraction)
 
-    def register(self) -> None:
-        """Let :func:`is_monitored` and the interpreter's exit know of this monitor."""
+    @property
+    def setup(self) -> Any:
+        """The setup of the planner; None once it was let go of."""
+        return self._setup
+
+    def node_positions(self) -> list[tuple[float, float]]:
+        """Return the (x, y) of the nodes of the planner's tree, world."""
+        if self._planner is None:
+            return []
+        data, read = planner_data(self._planner), self._states.read
+        return [read(data.getVertex(i).getState()) for i in range(data.numVertices())]
+
+    def register(self, awaited: AwaitedHeatmap | None = None) -> None:
+        """Let :func:`is_monitored` and the interpreter's exit know of this monitor.
+
+        Args:
+            awaited: the heat map that is waited for, whose failure a solve raises at its end.
+        """
         _alive.add(self)
+        self._awaited = awaited
         targets = [one for one in (self._setup, self._planner) if hasattr(one, "solve")]
-        self._watches = [SolveWatch(target, self.check_goal) for target in targets]
+        after = _do_nothing if awaited is None else awaited.raise_failure
+        self._watches = [SolveWatch(target, self.check_goal, after) for target in targets]
 
     def check_goal(self) -> None:
         """Raise if the goal was replaced: the planner would sample nothing but the new one.
@@ -202,6 +222,8 @@ class PlannerMonitor:
         for watch in self._watches:
             watch.release()
         self._watches = []
+        if self._awaited is not None:
+            self._awaited.release()
         self._planner = self._problem = self._goal = self._setup = self._call = None
         self._cost = self.injected_goal = None
 
@@ -265,6 +287,10 @@ def release_forgotten() -> None:
     for monitor in list(_alive):
         if monitor.is_forgotten():
             monitor.release()
+
+
+def _do_nothing() -> None:
+    pass
 
 
 _alive: weakref.WeakSet[PlannerMonitor] = weakref.WeakSet()

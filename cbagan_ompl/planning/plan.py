@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import secrets
 from dataclasses import dataclass, replace
+from functools import partial
 from math import inf
 from os import PathLike
 from time import perf_counter
@@ -14,12 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..common.validation import (
     finite_number,
-    is_finite_number,
     positive_number,
     truth_value,
     whole_number,
 )
-from ..errors import ConfigError, MapError, RobotError, show
+from ..errors import ConfigError, MapError, show
 from ..maps.endpoints import Moves
 from ..maps.grid_map import GridMap
 from ..robots.robot import Robot
@@ -37,7 +37,8 @@ from .heatmap_sources import (
     heatmap_source,
     resolve_auto,
 )
-from .hooks import check_planner, hangs_at_optimum
+from .hooks import check_planner, check_switchable, hangs_at_optimum
+from .overlapping import Prediction, can_overlap
 from .paths import checked_path, follow_path, path_cost
 from .plan_result import PlanResult
 from .planner_names import planner_name
@@ -48,7 +49,7 @@ from .problem import (
 )
 from .solving import Limits, SolveRecord, solve
 from .states import state_access
-from .workspace import Workspace
+from .workspace import Workspace, robot_of
 
 if TYPE_CHECKING:
     from ..inference.predictor import Predictor
@@ -69,6 +70,7 @@ def plan(
     snap: float = 0.0,
     model: Predictor | str | PathLike[str] | None = None,
     heatmap: Heatmap | ArrayLike | None = None,
+    overlap: bool = False,
     simplify: bool = False,
     goal_tolerance: float | None = None,
     keep_tree: bool = False,
@@ -100,6 +102,10 @@ def plan(
             model by default.
         heatmap: to be sampled in place of the learned one: of this map, or an array (H, W) as
             :class:`Heatmap` takes it.
+        overlap: let the planner begin on its own sampler while a thread makes the heat map, and
+            switch to that when it is there. Then it depends on time which samples the planner gets
+            from which source, so that a seed does not repeat a run. With a single processor core
+            the heat map is waited for; the ``overlap`` of the result says so.
         simplify: let OMPL's path simplifier shorten the path afterwards.
         goal_tolerance: how far from the goal a path may end, world units; by default a pixel. At 0
             paths end in the goal itself.
@@ -130,7 +136,7 @@ def plan(
     if not isinstance(grid, GridMap | str | PathLike):
         raise MapError(f"grid is a GridMap or the file of a map, got {show(grid)}")
     source = grid if isinstance(grid, GridMap) else GridMap.load(grid)
-    workspace = Workspace(source, _robot_of(robot, radius))
+    workspace = Workspace(source, robot_of(robot, radius))
     goals = split_goals(goal)
     moves: Moves = {}
     distance = finite_number("snap", snap, 0.0)
@@ -149,6 +155,13 @@ def plan(
     if heatmap is None:
         sampler, model = resolve_auto(sampler, model, source)
     name, make_heatmap = heatmap_source(sampler, model, heatmap)
+    if truth_value("overlap", overlap):
+        if make_heatmap is None or heatmap is not None:
+            raise ConfigError(
+                "overlap is for heat maps that are made while the planner plans: leave it out with "
+                "the uniform sampler and with a heat map of your own"
+            )
+        check_switchable(planner)
     job = _Job(
         map_name=source.name,
         workspace=workspace,
@@ -163,6 +176,7 @@ def plan(
         make_heatmap=make_heatmap,
         options=options,
         seed=seed,
+        overlap=overlap and can_overlap(),
         simplify=truth_value("simplify", simplify),
         keep_tree=truth_value("keep_tree", keep_tree),
     )
@@ -187,23 +201,9 @@ class _Job:
     make_heatmap: HeatmapSource | None
     options: SamplerOptions
     seed: int
+    overlap: bool
     simplify: bool
     keep_tree: bool
-
-
-def _robot_of(robot: Robot | None, radius: float) -> Robot:
-    """Return the robot that is meant by both options."""
-    if robot is not None and not isinstance(robot, Robot):
-        raise RobotError(
-            f"robot is a Robot, such as Robot.rectangle(length, width), got {show(robot)}"
-        )
-    if not is_finite_number(radius) or radius < 0:
-        raise MapError(f"the robot radius must be a length of at least 0, got {show(radius)}")
-    if radius == 0:
-        return robot or Robot.point()
-    if robot is not None:
-        raise RobotError("give robot or radius, which is short for robot=Robot.disc(radius)")
-    return Robot.disc(radius)
 
 
 def _with_seed(options: SamplerOptions) -> tuple[SamplerOptions, int]:
@@ -219,23 +219,48 @@ def _run(job: _Job) -> PlanResult:
     compat.seed_ompl(job.seed)
     setup = _set_up(job)
     began = perf_counter()
-    heatmap, attachment = None, None
-    if job.make_heatmap is not None:
-        source = job.make_heatmap
-        if job.sampler != OWN_HEATMAP:
-            source = job.workspace.adapt(source)
-        heatmap = heatmap_of_goals(
-            source, job.workspace.grid, job.start[:2], [goal[:2] for goal in job.goals]
-        )
-        attachment = attach(setup, heatmap, job.options)
-    inference_s = perf_counter() - began if attachment else 0.0
+    attachment, prediction = None, None
+    if job.overlap:
+        prediction = Prediction(partial(_make_heatmap, job))
+        attachment = attach(setup, prediction.future, job.options)
+    elif job.make_heatmap is not None:
+        attachment = attach(setup, _make_heatmap(job), job.options)
+    waited_s = perf_counter() - began if attachment else 0.0
     try:
-        run = solve(setup, job.planner, job.limits)
+        run = solve(setup, job.planner, job.limits, attachment)
         simplify_s = _simplify(setup) if job.simplify and run.is_exact else 0.0
-        return _result(job, setup, run, heatmap, attachment, inference_s, simplify_s)
+        inference_s = waited_s if prediction is None else prediction.seconds()
+        times = _Times(inference_s, waited_s, simplify_s)
+        return _result(job, setup, run, attachment, times)
+    except BaseException:
+        if prediction is not None:
+            prediction.wait()
+        raise
     finally:
         if attachment is not None:
             attachment.force_detach()
+
+
+@dataclass(frozen=True)
+class _Times:
+    """Seconds of all but the solve; ``waited`` are those before it, for the heat map."""
+
+    inference: float
+    waited: float
+    simplify: float
+
+
+def _make_heatmap(job: _Job) -> Heatmap:
+    assert job.make_heatmap is not None, "it is asked for"
+    source, goals = job.make_heatmap, [goal[:2] for goal in job.goals]
+    if job.sampler != OWN_HEATMAP:
+        source = job.workspace.adapt(source)
+    heatmap = heatmap_of_goals(source, job.workspace.grid, job.start[:2], goals)
+    follows_heading = job.options.heading.uniform_fraction < 1
+    # Made here, because with overlap here is beside the planner.
+    if job.workspace.robot.has_heading and heatmap.heading is None and follows_heading:
+        return heatmap.directed(np.array(goals))
+    return heatmap
 
 
 def _set_up(job: _Job) -> Any:
@@ -267,16 +292,15 @@ def _result(
     job: _Job,
     setup: Any,
     run: SolveRecord,
-    heatmap: Heatmap | None,
     attachment: Attachment | None,
-    inference_s: float,
-    simplify_s: float,
+    times: _Times,
 ) -> PlanResult:
     workspace, checked, goal = job.workspace, None, job.goals[0]
     if run.is_exact:
         goal = reached_goal(setup, workspace, job.goals)
         checked = checked_path(setup, workspace, (job.start, goal), job.tolerance)
     is_solved = checked is not None
+    first_s = run.first_solution_s if is_solved else None
     path = np.empty((0, len(job.start))) if checked is None else checked
     return PlanResult(
         solved=is_solved,
@@ -295,17 +319,20 @@ def _result(
         path=path,
         trajectory=follow_path(setup, workspace, path, workspace.source.resolution / 2),
         cost=path_cost(setup, workspace, path) if is_solved else inf,
-        inference_s=inference_s,
+        overlap=job.overlap,
+        heatmap_arrival_s=attachment.arrival_s if attachment and job.overlap else None,
+        inference_s=times.inference,
         planning_s=run.planning_s,
-        simplify_s=simplify_s,
-        total_s=inference_s + run.planning_s + simplify_s,
-        first_solution_s=run.first_solution_s if is_solved else None,
+        simplify_s=times.simplify,
+        total_s=times.waited + run.planning_s + times.simplify,
+        first_solution_s=first_s,
+        first_solution_total_s=None if first_s is None else times.waited + first_s,
         progress=run.progress,
         iterations=run.iterations,
         nodes=run.nodes,
         nodes_at_first_solution=run.nodes_at_first_solution if is_solved else None,
         sample_counts=attachment.sample_counts if attachment else {"learned": 0, "uniform": 0},
         heatmap_kept=False,
-        heatmap=heatmap,
+        heatmap=attachment.heatmap if attachment else None,
         tree=_tree_of(setup) if job.keep_tree else None,
     )

@@ -44,12 +44,18 @@ class PlanResult:
             half a pixel, way points included, (M, 2) or (M, 3), world; empty when not solved.
         cost: length of the path, along the curves of robots with a turning radius; in SE(2) half of
             each turn, in radians, counts as well, as OMPL has it. Infinite when not solved.
-        inference_s: making the heat map and attaching it, loading the model not included.
+        overlap: whether the planner planned while the heat map was made.
+        heatmap_arrival_s: with overlap, seconds from the beginning until the planner sampled the
+            heat map; None where it ended before that, and without overlap.
+        inference_s: making the heat map and attaching it, loading the model not included; with
+            overlap the time of its thread alone, until the planner ended at most.
         planning_s: inside the planner's ``solve``.
         simplify_s: inside OMPL's path simplifier.
-        total_s: the sum of the three.
+        total_s: the sum of the three; with overlap, seconds that have passed.
         first_solution_s: planning time to the first solution; None when not solved or the
             planner does not let it be known.
+        first_solution_total_s: the same from the beginning: inference included without overlap, and
+            what has passed with it.
         progress: (planning time, cost) of each better solution that the planner came upon, (K, 2);
             empty for planners that do not tell the cost of their best solution.
         iterations: evaluations of the termination condition, about one per iteration; None for
@@ -90,11 +96,14 @@ class PlanResult:
     path: NDArray[np.float64]
     trajectory: NDArray[np.float64]
     cost: float
+    overlap: bool
+    heatmap_arrival_s: float | None
     inference_s: float
     planning_s: float
     simplify_s: float
     total_s: float
     first_solution_s: float | None
+    first_solution_total_s: float | None
     progress: NDArray[np.float64]
     iterations: int | None
     nodes: int

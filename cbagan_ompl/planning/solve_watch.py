@@ -15,13 +15,14 @@ class SolveWatch:
     Args:
         target: a setup or a planner.
         check: called before each solve.
+        after: called after each solve that has returned.
     """
 
-    def __init__(self, target: Any, check: Callable[[], None]) -> None:
+    def __init__(self, target: Any, check: Callable[[], None], after: Callable[[], None]) -> None:
         self._calls: list[None] = []
         self._count = 0
         self._target: Any = target
-        self._watched: Any = self._watch_calls(target.solve, check)
+        self._watched: Any = self._watch_calls(target.solve, check, after)
         try:
             target.solve = self._watched
         except AttributeError:
@@ -50,7 +51,7 @@ class SolveWatch:
         self._target = self._watched = None
 
     def _watch_calls(
-        self, function: Callable[..., Any], check: Callable[[], None]
+        self, function: Callable[..., Any], check: Callable[[], None], after: Callable[[], None]
     ) -> Callable[..., Any]:
         @wraps(function)
         def watched(*arguments: Any, **options: Any) -> Any:
@@ -58,8 +59,10 @@ class SolveWatch:
             self._count += 1
             self._calls.append(None)
             try:
-                return function(*arguments, **options)
+                result = function(*arguments, **options)
             finally:
                 self._calls.pop()
+            after()
+            return result
 
         return watched

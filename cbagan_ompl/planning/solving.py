@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..common.validation import positive_number, whole_number
 from ..errors import ConfigError
 from . import compat
+from .attach import Attachment
 from .hooks import asks_in_thread, hangs_on_python_termination, stops_at_first
 from .monitor import CostHistory
 
@@ -75,18 +76,22 @@ class SolveRecord:
     nodes_at_first_solution: int | None
 
 
-def solve(setup: Any, planner: str, limits: Limits) -> SolveRecord:
+def solve(
+    setup: Any, planner: str, limits: Limits, attachment: Attachment | None = None
+) -> SolveRecord:
     """Let the planner of a setup solve its problem.
 
     Args:
         setup: a SimpleSetup, set up.
         planner: OMPL's name of its planner.
         limits: when the planner is to stop.
+        attachment: to a heat map that may be waited for, whose failure ends the solve.
     """
     watch = None
     if limits.can_watch:
         # A roadmap that another thread works on is not to be read.
-        watch = _Watch(setup.getPlanner(), limits, counts_nodes=not asks_in_thread(planner))
+        counts_nodes = not asks_in_thread(planner)
+        watch = _Watch(setup.getPlanner(), limits, counts_nodes, attachment)
     condition = compat.termination_condition(watch.stop) if watch else limits.time
     began = perf_counter()
     status = setup.solve(condition)
@@ -111,13 +116,17 @@ def solve(setup: Any, planner: str, limits: Limits) -> SolveRecord:
 class _Watch:
     """The termination condition: counts iterations, and notes each better solution."""
 
-    def __init__(self, planner: Any, limits: Limits, counts_nodes: bool) -> None:
+    def __init__(
+        self, planner: Any, limits: Limits, counts_nodes: bool, attachment: Attachment | None
+    ) -> None:
         self.iterations = 0
         self.history = CostHistory(planner)
         self.nodes_at_first: int | None = None
         self._planner = planner if counts_nodes else None
         self._most = inf if limits.iterations is None else limits.iterations
         self._time = limits.time
+        is_awaited = attachment is not None and attachment.arrival_s is None
+        self._awaited = attachment if is_awaited else None
 
     def stop(self) -> bool:
         elapsed = self.history.look()
@@ -125,6 +134,8 @@ class _Watch:
             self.nodes_at_first = _count_nodes(self._planner)
             self._planner = None
         if elapsed >= self._time or self.iterations >= self._most:
+            return True
+        if self._awaited is not None and self._awaited.has_failed:
             return True
         self.iterations += 1
         return False

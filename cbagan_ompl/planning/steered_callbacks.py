@@ -7,9 +7,11 @@ from collections.abc import Callable
 from typing import Any
 
 from ..sampling.sampler import HeatmapSampler
-from .bounds_steering import BoundsSteering, SteeringMonitor
+from .awaited import AwaitedHeatmap
+from .bounds_steering import BoundsSteering
 from .compat import ob
 from .states import StateAccess
+from .steering_monitor import SteeringMonitor
 
 
 class SteeredGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
@@ -90,14 +92,17 @@ class SteeredMotions(ob.MotionValidator):  # type: ignore[misc]
 
 
 def install_steering(
-    setup: Any, states: StateAccess, sampler: HeatmapSampler, monitor: SteeringMonitor
+    setup: Any,
+    states: StateAccess,
+    source: HeatmapSampler | AwaitedHeatmap,
+    monitor: SteeringMonitor,
 ) -> Callable[[], None]:
     """Put goal, validity checker and motion validator of a setup into wrappers that steer.
 
     Args:
         setup: a SimpleSetup with its planner, start and goal.
         states: access to the positions of its states.
-        sampler: of the heat map.
+        source: the sampler of the heat map, or the heat map that is waited for.
         monitor: of the planner.
 
     Returns:
@@ -105,7 +110,7 @@ def install_steering(
     """
     si, goal = setup.getSpaceInformation(), setup.getGoal()
     was_set_up = si.isSetup()
-    steering = BoundsSteering(setup.getStateSpace(), states, sampler, monitor)
+    steering = BoundsSteering(setup.getStateSpace(), states, source, monitor)
     checker, motions = SteeredChecker(si, steering), SteeredMotions(si, steering)
     steered = SteeredGoal(si, goal, steering)
     si.setStateValidityChecker(checker)

@@ -8,9 +8,16 @@ from numpy.typing import NDArray
 from ..common.compilation import compiled
 from ..maps.grid_map import GridMap
 from .heatmap import Heatmap
+from .painted_headings import PaintedHeatmap
 
 
-def paint_heatmap(values: NDArray[np.float32], grid: GridMap, least: float) -> Heatmap | None:
+def paint_heatmap(
+    values: NDArray[np.float32],
+    grid: GridMap,
+    least: float,
+    directions: NDArray[np.float32] | None = None,
+    patches: tuple[float, float] = (1, 1),
+) -> Heatmap | None:
     """Return the heat map of values at another size, by bilinear interpolation.
 
     A region of a few per cent of the pixels costs a few per cent of the time.
@@ -19,6 +26,8 @@ def paint_heatmap(values: NDArray[np.float32], grid: GridMap, least: float) -> H
         values: (h, w), in [0, 1].
         grid: the map.
         least: values below it, after the interpolation, become 0.
+        directions: of travel, see :class:`.painted_headings.PaintedHeatmap`; None for no headings.
+        patches: see there.
 
     Returns:
         None where all free pixels would be 0.
@@ -36,8 +45,14 @@ def paint_heatmap(values: NDArray[np.float32], grid: GridMap, least: float) -> H
         return None
     result.setflags(write=False)
     # All that Heatmap() would check is known: it reads every pixel.
-    heatmap = Heatmap.__new__(Heatmap)
-    heatmap.values, heatmap.grid, heatmap.heading = result, grid, None
+    heatmap: Heatmap
+    if directions is None:
+        heatmap = Heatmap.__new__(Heatmap)
+        heatmap.heading = None
+    else:
+        heatmap = painted = PaintedHeatmap.__new__(PaintedHeatmap)
+        painted.directions, painted.patches = directions, patches
+    heatmap.values, heatmap.grid = result, grid
     heatmap.guarantee = None
     heatmap._support = indices[:count].copy()
     return heatmap

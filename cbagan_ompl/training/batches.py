@@ -12,6 +12,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from ..datasets.dataset import Tasks
+from ..datasets.geodesic_labels import DIRECTION_PATCH
 from ..errors import DatasetError
 from ..networks.blocks import stride_of
 from ..networks.config import MAX_IMAGE_SIZE
@@ -62,12 +63,15 @@ class Batch:
         start: (B, 2) pixel coordinates (u, v), u right and v down.
         goal: (B, 2) the same.
         region: (B, 1, S, S) float in [0, 1], 1 in the region.
+        direction: (B, 2, S // 4, S // 4), see
+            :func:`cbagan_ompl.datasets.geodesic_labels.travel_directions`; 0 where unknown.
     """
 
     free: Tensor
     start: Tensor
     goal: Tensor
     region: Tensor
+    direction: Tensor
 
 
 @dataclass(frozen=True)
@@ -110,21 +114,25 @@ def make_batch(
         reversal: exchange start and goal of each task at random.
     """
     free, region = tasks.maps[tasks.map_of[indices]], tasks.region[indices]
+    direction = _directions_of(tasks, indices)
     endpoints = np.stack((tasks.start[indices], tasks.goal[indices]), axis=1)
     if rng is not None and symmetries:
+        codes = rng.integers(8, size=len(indices)).tolist()
         turned = [
-            apply_symmetry(code, free[i], region[i], endpoints[i])
-            for i, code in enumerate(rng.integers(8, size=len(indices)).tolist())
+            apply_symmetry(code, free[i], region[i], endpoints[i]) for i, code in enumerate(codes)
         ]
+        direction = np.stack([turn_vectors(*pair) for pair in zip(codes, direction, strict=True)])
         free, region, endpoints = (np.stack(parts) for parts in zip(*turned, strict=True))
     if rng is not None and reversal:
         swap = rng.random(len(indices)) < 0.5
         endpoints[swap] = endpoints[swap][:, ::-1]
+        direction[swap] = 0  # of the way back nothing is known
     return Batch(
         torch.from_numpy(free).to(device).unsqueeze(1).float(),
         torch.from_numpy(endpoints[:, 0].copy()).to(device),
         torch.from_numpy(endpoints[:, 1].copy()).to(device),
         torch.from_numpy(region).to(device).unsqueeze(1).float(),
+        torch.from_numpy(direction).to(device).float(),
     )
 
 
@@ -142,7 +150,27 @@ def scale_down(batch: Batch, factor: int) -> Batch:
         batch.start / factor,
         batch.goal / factor,
         functional.max_pool2d(batch.region, factor),
+        functional.avg_pool2d(batch.direction, factor),
     )
+
+
+def _directions_of(tasks: Tasks, indices: NDArray[np.int64]) -> NDArray[np.float16]:
+    """Return the directions of travel of some tasks; 0 where they are not known."""
+    if tasks.direction is not None:
+        return tasks.direction[indices]
+    side = tasks.size // DIRECTION_PATCH
+    return np.zeros((len(indices), 2, side, side), np.float16)
+
+
+def turn_vectors(code: int, vectors: NDArray[np.float16]) -> NDArray[np.float16]:
+    """Apply one of the 8 symmetries of :func:`apply_symmetry` to vectors (u, v), (2, h, w)."""
+    if code & 1:
+        vectors = vectors[:, :, ::-1] * np.array([-1, 1], vectors.dtype)[:, None, None]
+    if code & 2:
+        vectors = vectors[:, ::-1] * np.array([1, -1], vectors.dtype)[:, None, None]
+    if code & 4:
+        vectors = vectors[::-1].transpose(0, 2, 1)
+    return vectors
 
 
 def apply_symmetry(

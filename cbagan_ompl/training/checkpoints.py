@@ -14,9 +14,8 @@ from ..common.files import as_path, write_atomically
 from ..errors import ModelError, show
 from ..inference.model_files import translate_damage
 from ..networks.config import MAX_IMAGE_SIZE
+from ..networks.export_model import AnyGenerator
 from ..networks.factory import check_weights, make_generator
-from ..networks.generator import Generator
-from ..networks.patch_generator import PatchGenerator
 from .checkpoint_files import read_checkpoint
 from .config import TrainingConfig
 
@@ -94,9 +93,7 @@ def load_checkpoint(path: str | PathLike[str]) -> dict[str, Any]:
     return {**state, "config": config.to_dict()}
 
 
-def best_generator(
-    state: dict[str, Any], path: str | PathLike[str] = "checkpoint"
-) -> Generator | PatchGenerator:
+def best_generator(state: dict[str, Any], path: str | PathLike[str] = "checkpoint") -> AnyGenerator:
     """Return the generator that the epoch of a checkpoint was validated with, in evaluation mode.
 
     Args:

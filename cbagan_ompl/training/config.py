@@ -73,6 +73,8 @@ class TrainingConfig:
         dice_smooth: smoothing term of the Dice loss.
         positive_weight: factor of the region's part of the binary cross-entropy; above 1 a missed
             pixel costs more than one too many.
+        direction_weight: factor of the loss of the directions of travel, for networks that paint
+            them on tasks that have them.
         scales: each batch is scaled down by one of these factors at random, so that the networks
             learn from coarse maps as well.
         symmetries: turn and mirror each task at random (8 symmetries of the square).
@@ -118,6 +120,7 @@ class TrainingConfig:
     dice_weight: float = 10.0
     dice_smooth: float = 1.0
     positive_weight: float = 1.0
+    direction_weight: float = 1.0
     scales: tuple[int, ...] = (1,)
     symmetries: bool = True
     reversal: bool = False
@@ -250,6 +253,7 @@ RULES = {
     "dice_weight": AT_LEAST_0,
     "dice_smooth": AT_LEAST_0,
     "positive_weight": AT_LEAST_0,
+    "direction_weight": AT_LEAST_0,
     "scales": Rule(
         lambda value: 0 < len(value) <= 64 and min(value) >= 1 and max(value) <= 64,
         "from 1 to 64, and 64 of them at most",
@@ -261,7 +265,7 @@ RULES = {
 }
 
 # The architecture of the bundled model.
-_BUNDLED = NetworkConfig(widths=(32, 48, 64), patch=4, cost_maps=2, white_obstacles=True)
+_BUNDLED = NetworkConfig(widths=(24, 32), patch=4, passages=True, white_obstacles=True)
 
 #: ``synthetic`` is what the bundled model was trained with: for images of 256 pixels, with new maps
 #: in every epoch. ``refine`` goes on from it on a data set, for segmentation alone, on maps that
@@ -274,14 +278,14 @@ PRESETS: dict[str, TrainingConfig] = {
     "best": TrainingConfig(),
     "synthetic": TrainingConfig(
         network=_BUNDLED,
-        epochs=40,
+        epochs=14,
         batch_size=16,
         warmup=0.05,
         clip_norm=2.0,
-        adversarial_every=8,
+        adversarial_every=16,
         pixel_weight=4.0,
         dice_weight=2.0,
-        positive_weight=3.5,
+        positive_weight=1.5,
         scales=(1, 1, 1, 2),
         precision="bfloat16",
     ),

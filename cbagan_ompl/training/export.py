@@ -28,9 +28,7 @@ from ..inference.model_files import (
     read_manifest,
     read_record,
 )
-from ..networks.export_model import make_region_model
-from ..networks.generator import Generator
-from ..networks.patch_generator import PatchGenerator
+from ..networks.export_model import AnyGenerator, make_region_model
 from ..sampling.guarantee import RECORD_KEY, Guarantee
 from .cards import MAX_CARD_BYTES, is_card, model_card, with_guarantee
 from .checkpoints import best_generator, load_checkpoint
@@ -131,9 +129,7 @@ def add_guarantee(path: str | PathLike[str], guarantee: Guarantee) -> dict[str, 
     return record
 
 
-def _read_source(
-    path: Path, name: str, note: str
-) -> tuple[Generator | PatchGenerator, dict[str, Any]]:
+def _read_source(path: Path, name: str, note: str) -> tuple[AnyGenerator, dict[str, Any]]:
     """Return the generator of a checkpoint or of an exported model, and the record of its export.
 
     Args:

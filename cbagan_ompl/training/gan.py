@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from typing import Any
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor, nn
@@ -14,6 +14,26 @@ from ..networks.discriminator import Discriminator
 from ..networks.factory import make_discriminator, make_generator
 from .config import TrainingConfig
 from .distributed import ProcessGroup, synchronize_batch_norm
+
+
+class Painted(NamedTuple):
+    """What a generator returns, in float32.
+
+    Attributes:
+        image: of the region, (B, 3, H, W) in [-1, 1].
+        direction: of travel, (B, 2, h, w), see
+            :class:`cbagan_ompl.networks.passage_generator.PassageGenerator`; None of the others.
+    """
+
+    image: Tensor
+    direction: Tensor | None
+
+    @classmethod
+    def of(cls, output: Tensor | tuple[Tensor, Tensor]) -> Painted:
+        """Return the output of any generator."""
+        if isinstance(output, Tensor):
+            return cls(output.float(), None)
+        return cls(output[0].float(), output[1].float())
 
 
 class Gan:
@@ -79,11 +99,16 @@ class Gan:
             device.type, torch.bfloat16, enabled=config.precision == "bfloat16"
         )
 
+    def generate(self, *inputs: Tensor) -> Painted:
+        """Return what the generator paints, computed as by :meth:`run`."""
+        with self._precision:
+            return Painted.of(self._trained["generator"](*inputs))
+
     def run(self, name: str, *inputs: Tensor, trained: bool = True) -> Tensor:
         """Return the output of a network, computed in the precision of the recipe, in float32.
 
         Args:
-            name: ``generator``, ``map_discriminator`` or ``point_discriminator``.
+            name: ``map_discriminator`` or ``point_discriminator``.
             inputs: of the network.
             trained: the backward pass reaches the weights of the network, and their gradients are
                 averaged over the processes. False for a discriminator in a step of the generator.

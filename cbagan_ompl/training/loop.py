@@ -282,12 +282,12 @@ def _step(
     shard = gan.group.shard
     batch, noise = Batch(*map(shard, vars(batch).values())), shard(noise)
     images = encode(batch)
-    fake = gan.run("generator", images.map, images.points, noise)
+    painted = gan.generate(images.map, images.points, noise)
     if not config.adversarial_weight or step % config.adversarial_every:
-        return generator_step(gan, config, batch, images, fake, None)
-    errors = discriminator_step(gan, images, fake)
+        return generator_step(gan, config, batch, images, painted, None)
+    errors = discriminator_step(gan, images, painted.image)
     weights = adversarial_weights(config, errors)
-    return errors | generator_step(gan, config, batch, images, fake, weights)
+    return errors | generator_step(gan, config, batch, images, painted, weights)
 
 
 def _save(run: Run, config: TrainingConfig, source: TaskSource, folder: Path) -> None:
@@ -307,8 +307,9 @@ def _save(run: Run, config: TrainingConfig, source: TaskSource, folder: Path) ->
 def _load_matching(path: Path, config: TrainingConfig, source: TaskSource) -> dict[str, Any]:
     """Return the checkpoint to resume from, which must have the same recipe and tasks."""
     state = load_checkpoint(path)
-    saved, wanted = state["config"], config.to_dict()
-    changed = [name for name in wanted if name != "epochs" and saved.get(name) != wanted[name]]
+    # Options that earlier versions did not have are at their defaults.
+    saved, wanted = TrainingConfig().to_dict() | state["config"], config.to_dict()
+    changed = [name for name in wanted if name != "epochs" and saved[name] != wanted[name]]
     if changed:
         raise ConfigError(
             f"{path} was written with other values of {', '.join(changed)}; "

@@ -145,6 +145,20 @@ def pixel_loss(image: Tensor, target: Tensor) -> Tensor:
     return functional.mse_loss(image, target)
 
 
+def direction_loss(vectors: Tensor, target: Tensor, region: Tensor) -> Tensor:
+    """Return the mean of 1 - cos of the angle between painted and true directions of travel.
+
+    Args:
+        vectors: unit vectors, (B, 2, h, w); 0 where nothing is painted.
+        target: the true ones, (B, 2, h, w); shorter where less certain, 0 where unknown.
+        region: the true region, (B, 1, H, W) in [0, 1]: its mean in a patch is the patch's weight.
+    """
+    length = (target[:, 0].square() + target[:, 1].square()).sqrt()
+    weight = length * functional.adaptive_avg_pool2d(region, (target.size(2), target.size(3)))[:, 0]
+    cosine = (vectors * target).sum(1) / length.clamp(min=1e-6)
+    return (weight * (1 - cosine)).sum() / weight.sum().clamp(min=1e-6)
+
+
 def generator_loss(
     adversarial: Tensor,
     pixel: Tensor,

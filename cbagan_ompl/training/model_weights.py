@@ -26,9 +26,16 @@ from ..inference.bundled_models import find_model
 from ..inference.model_files import ModelFormat, is_model, load_script, read_model
 from ..inference.predictor import load_model
 from ..networks.config import NetworkConfig
-from ..networks.export_model import PatchModel, RegionModel, make_region_model
+from ..networks.export_model import (
+    AnyGenerator,
+    PatchModel,
+    RegionModel,
+    make_region_model,
+)
 from ..networks.factory import make_generator
 from ..networks.generator import Generator
+from ..networks.passage_generator import PassageGenerator
+from ..networks.passage_model import PassageModel
 from ..networks.patch_generator import PatchGenerator
 from .batches import encode, make_batch
 from .checkpoints import load_checkpoint
@@ -64,7 +71,7 @@ def starting_weights(path: str | PathLike[str], tasks: Tasks) -> dict[str, Any]:
     return {"average": generator.state_dict()}
 
 
-def recover_generator(path: Path) -> Generator | PatchGenerator:
+def recover_generator(path: Path) -> AnyGenerator:
     """Return a generator in evaluation mode that computes what an exported model does.
 
     Each batch norm that was folded into a convolution only adds a constant until
@@ -97,7 +104,7 @@ def _architecture(record: dict[str, Any]) -> NetworkConfig:
 
 
 @torch.no_grad()
-def estimate_statistics(generator: Generator | PatchGenerator, tasks: Tasks) -> None:
+def estimate_statistics(generator: AnyGenerator, tasks: Tasks) -> None:
     """Give folded batch norms the statistics of their inputs, without changing what they compute.
 
     In training a batch norm scales its input by the statistics of the batch. It begins with what
@@ -132,13 +139,14 @@ def estimate_statistics(generator: Generator | PatchGenerator, tasks: Tasks) -> 
 
 
 @torch.no_grad()
-def _take_over(generator: Generator | PatchGenerator, weights: list[Tensor]) -> None:
+def _take_over(generator: AnyGenerator, weights: list[Tensor]) -> None:
     """Set the weights of a generator from those of an exported one."""
     # No two weights are equal: equal constants become one.
     for parameter in generator.parameters():
         parameter.normal_()
-    for buffer in generator.buffers():
-        if buffer.is_floating_point():
+    kept = generator.state_dict()
+    for name, buffer in generator.named_buffers():
+        if name in kept and buffer.is_floating_point():
             buffer.uniform_(0.5, 1.5)
     region = make_region_model(generator)
     script = load_script(script_bytes(region, {}))
@@ -152,30 +160,35 @@ def _take_over(generator: Generator | PatchGenerator, weights: list[Tensor]) -> 
         current[f"{name}.weight"].fill_(1)
         current[f"{name}.running_mean"].zero_()
         current[f"{name}.running_var"].fill_(1 - norm.eps)
-    if isinstance(generator, PatchGenerator):
+    if not isinstance(generator, Generator):
         state |= _unfold_stems(generator, state)
     for name in state.keys() & current.keys():
         current[name].copy_(state[name].view_as(current[name]))
 
 
-def _unfold_stems(generator: PatchGenerator, state: dict[str, Tensor]) -> dict[str, Tensor]:
-    """Return the stems of a generator that compute what those of a :class:`PatchModel` do."""
+def _unfold_stems(
+    generator: PatchGenerator | PassageGenerator, state: dict[str, Tensor]
+) -> dict[str, Tensor]:
+    """Return the stems of a generator that compute what those of the exported model do."""
     # A map has three equal colours, 2 x - 1 of its free space x: each gets a third of the weight.
     stem = state["map.weight"].view_as(generator.map_stem.weight[:, :1]) / 6
     weight = stem.expand_as(generator.map_stem.weight)
-    return {
+    stems = {
         "map_stem.weight": weight,
         "map_stem.bias": state["map.bias"] + weight.sum((1, 2, 3)),
-        "point_stem.bias": state["white"].flatten() - state["point_stem.weight"].flatten(1).sum(1),
         # The noise is 0 in the model, and its weights are not in the file.
         "noise_stem.weight": torch.zeros_like(generator.noise_stem.weight),
         "noise_stem.bias": torch.zeros(len(generator.noise_stem.weight)),
     }
+    if isinstance(generator, PassageGenerator):
+        return stems | {"merge.bias": torch.zeros(len(generator.merge.weight))}
+    white = state["white"].flatten() - state["point_stem.weight"].flatten(1).sum(1)
+    return stems | {"point_stem.bias": white}
 
 
-def _named_values(region: RegionModel) -> dict[str, Tensor]:
+def _named_values(region: RegionModel | PassageModel) -> dict[str, Tensor]:
     """Return the weights of a model as the exported file has them, by name."""
-    model = region.model
+    model = region if isinstance(region, PassageModel) else region.model
     generator = model.generator
     assert isinstance(generator, nn.Module)
     values = {
@@ -194,8 +207,14 @@ def _named_values(region: RegionModel) -> dict[str, Tensor]:
             norm.bias,
         )
         values[f"{convolution}.weight"], values[f"{norm_name}.bias"] = weight, bias
-    if isinstance(model, PatchModel):
+    if isinstance(model, PatchModel | PassageModel):
         values["map.weight"], values["map.bias"] = model.map_stem.weight, model.map_stem.bias
+    if isinstance(model, PassageModel):
+        # The norm behind these layers is folded into the first one.
+        assert model.merge.bias is not None
+        values["merge.weight"], values["norm.bias"] = model.merge.weight, model.merge.bias
+        values["offsets"] = model.generator.offsets
+    if isinstance(model, PatchModel):
         values["points.bias"], values["white"] = model.point_stem.bias, model.white_features
     return values
 
@@ -211,16 +230,18 @@ def _name_of(value: Tensor, values: dict[str, Tensor]) -> str:
 
 def _folded_norms(generator: nn.Module) -> dict[str, tuple[str, nn.BatchNorm2d]]:
     """Return each batch norm after a convolution, and its name, by that of the convolution."""
-    found = {}
+    found: dict[str, tuple[str, nn.BatchNorm2d]] = {}
     for name, module in generator.named_modules():
         if isinstance(module, nn.Sequential):
             for i, (layer, norm) in enumerate(pairwise(module)):
                 if isinstance(layer, nn.Conv2d) and isinstance(norm, nn.BatchNorm2d):
                     found[f"{name}.{i}"] = (f"{name}.{i + 1}", norm)
+    if isinstance(generator, PassageGenerator):  # its noise is a constant without noise
+        found["merge"] = ("norm", generator.norm)
     return found
 
 
-def _weights_of(model: Any, generator: Generator | PatchGenerator) -> list[Tensor]:
+def _weights_of(model: Any, generator: AnyGenerator) -> list[Tensor]:
     """Return the different weights of a frozen model, in the order of their last use in it.
 
     Of the features of no point in a :class:`PatchModel` the last ones are kept, those of a white
@@ -242,8 +263,9 @@ def _weights_of(model: Any, generator: Generator | PatchGenerator) -> list[Tenso
 
 def _all_constants(block: Any) -> Iterator[Tensor]:
     for node in block.nodes():
-        if node.kind() == "prim::Constant" and isinstance(node.output().toIValue(), Tensor):
-            yield node.output().toIValue()
+        value = node.output().toIValue() if node.kind() == "prim::Constant" else None
+        if isinstance(value, Tensor) and value.is_floating_point():
+            yield value
         for inner in node.blocks():
             yield from _all_constants(inner)
 

@@ -23,11 +23,12 @@ from torch import Tensor, nn
 from ..common.files import write_atomically
 from ..common.validation import require
 from ..errors import ModelError
+from ..inference.choice import make_pipeline
 from ..inference.graphs import Graphs, TorchGraphs
 from ..inference.model_files import RECORD_MEMBER, ModelFormat
 from ..inference.onnx_graphs import flatten
-from ..inference.pipelines import make_pipeline
 from ..networks.export_model import RegionModel
+from ..networks.passage_model import PassageModel
 
 _OPSET = 17
 
@@ -35,7 +36,7 @@ _OPSET = 17
 _EXAMPLES = ((1, 2, 1, 2), (3, 3, 2, 3))
 
 
-def save_onnx(model: RegionModel, path: Path, record: dict[str, Any]) -> None:
+def save_onnx(model: RegionModel | PassageModel, path: Path, record: dict[str, Any]) -> None:
     """Write a model as an archive of its graphs and its record.
 
     Args:
@@ -57,7 +58,7 @@ def save_onnx(model: RegionModel, path: Path, record: dict[str, Any]) -> None:
     write_atomically(path, buffer.getvalue(), ModelError)
 
 
-def onnx_graphs(model: RegionModel) -> dict[str, bytes]:
+def onnx_graphs(model: RegionModel | PassageModel) -> dict[str, bytes]:
     """Return the graphs of all functions that a prediction calls, by name.
 
     Args:
@@ -70,7 +71,7 @@ def onnx_graphs(model: RegionModel) -> dict[str, bytes]:
         points = np.linspace(3, 0.9 * model.stride, 2 * tasks, dtype=np.float32).reshape(-1, 2)
         pipeline = make_pipeline(recorder)
         with recorder.ready():
-            pipeline.probabilities(pipeline.read_maps(free), points, points[::-1].copy())
+            pipeline.paint(pipeline.read_maps(free), points, points[::-1].copy())
     one, other = recorders
     return {name: _export(model, name, one.calls[name], other.calls[name]) for name in one.calls}
 
@@ -96,7 +97,7 @@ class _Recorder:
 class _Function(nn.Module):
     """A method of a model, as a module whose inputs and outputs are tensors alone."""
 
-    def __init__(self, model: RegionModel, name: str, inputs: Sequence[Any]) -> None:
+    def __init__(self, model: RegionModel | PassageModel, name: str, inputs: Sequence[Any]) -> None:
         super().__init__()
         self.model, self.name = model, name
         # Of each input: the number of tensors in a list, or 0 for a tensor.
@@ -113,7 +114,7 @@ class _Function(nn.Module):
 
 
 def _export(
-    model: RegionModel,
+    model: RegionModel | PassageModel,
     name: str,
     one: tuple[Sequence[Any], list[NDArray[Any]]],
     other: tuple[Sequence[Any], list[NDArray[Any]]],

@@ -11,7 +11,7 @@ from ..networks.encoding import region_probability
 from . import losses
 from .batches import Batch, Images
 from .config import TrainingConfig
-from .gan import Gan
+from .gan import Gan, Painted
 
 
 def discriminator_step(gan: Gan, images: Images, fake: Tensor) -> dict[str, float]:
@@ -44,7 +44,7 @@ def generator_step(
     config: TrainingConfig,
     batch: Batch,
     images: Images,
-    fake: Tensor,
+    painted: Painted,
     weights: tuple[float, float] | None,
 ) -> dict[str, float]:
     """Train the generator.
@@ -54,13 +54,14 @@ def generator_step(
         config: factors of the losses.
         batch: tasks with their regions, or this process's shard of them.
         images: the same as images.
-        fake: the generator's images of the regions, with their graph.
+        painted: the generator's images of the regions, with their graph.
         weights: of the map and the point discriminator in the adversarial loss, adding up to 1;
             None for a step without an adversarial loss.
 
     Returns:
         The parts of the loss, means over the processes.
     """
+    fake = painted.image
     parts = {
         "pixel": losses.pixel_loss(fake, images.region),
         "segmentation": losses.segmentation_loss(
@@ -82,6 +83,8 @@ def generator_step(
             weights[0] * losses.adversarial_loss(map_logits)
             + weights[1] * losses.adversarial_loss(point_logits)
         )
+    if painted.direction is not None:
+        parts["direction"] = losses.direction_loss(painted.direction, batch.direction, batch.region)
     loss = losses.generator_loss(
         parts.get("adversarial", fake.new_zeros(())),
         parts["pixel"],
@@ -89,6 +92,7 @@ def generator_step(
         config.adversarial_weight,
         config.pixel_weight,
     )
+    loss = loss + config.direction_weight * parts.get("direction", 0.0)
     _descend(loss, gan.optimizers["generator"], config.clip_norm)
     for discriminator in gan.discriminators.values():
         discriminator.requires_grad_(True)

@@ -14,7 +14,6 @@ from torch import nn
 from ..common.files import write_atomically
 from ..errors import ModelError
 from ..inference.model_files import RECORD_NAME, SPLIT_METHODS
-from ..networks.export_model import SplitModel
 
 
 def save_script(model: nn.Module, path: Path, record: dict[str, Any]) -> None:
@@ -33,7 +32,7 @@ def script_bytes(model: nn.Module, record: dict[str, Any]) -> bytes:
         # package's models have, and torch goes on reading and writing it.
         warnings.simplefilter("ignore", DeprecationWarning)
         # No optimize_for_inference: what it writes cannot be loaded again.
-        methods = list(SPLIT_METHODS) if isinstance(model, SplitModel) else []
+        methods = [name for name in SPLIT_METHODS if hasattr(model, name)]
         frozen = torch.jit.freeze(torch.jit.script(model), preserved_attrs=methods)
         extra = {RECORD_NAME: json.dumps(record, indent=1)}
         buffer = io.BytesIO()

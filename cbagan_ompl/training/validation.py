@@ -15,6 +15,7 @@ from ..evaluation.metrics import region_scores
 from ..networks.encoding import region_probability
 from ..sampling.heatmap import REGION_THRESHOLD
 from .batches import encode, make_batch
+from .gan import Painted
 
 
 def evaluate(
@@ -43,7 +44,7 @@ def _predict(
         indices = np.arange(first, min(first + batch_size, len(tasks)))
         batch = make_batch(tasks, indices, device)
         images = encode(batch)
-        image = generator(images.map, images.points, torch.zeros_like(batch.free))
+        image = Painted.of(generator(images.map, images.points, torch.zeros_like(batch.free))).image
         yield (region_probability(image)[:, 0] >= REGION_THRESHOLD).cpu().numpy()
 
 

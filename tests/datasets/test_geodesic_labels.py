@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from cbagan_ompl.datasets.geodesic import distance_field
-from cbagan_ompl.datasets.geodesic_labels import EPSILON, SLACK, geodesic_label
+from cbagan_ompl.datasets.geodesic_labels import (
+    EPSILON,
+    SLACK,
+    geodesic_label,
+    travel_directions,
+)
 from cbagan_ompl.maps.connectivity import connects
 from cbagan_ompl.sampling.heatmap import REGION_THRESHOLD
 
@@ -45,3 +50,23 @@ def test_labels_keep_both_of_two_paths_of_equal_length() -> None:
         one = region.copy()
         one[half, 30:70] = False
         assert connects(one, (10, 30), (90, 30), connectivity=8)
+
+
+def test_directions_lead_along_the_shortest_path() -> None:
+    free = np.ones((64, 64), np.bool_)
+    free[:48, 31:33] = False
+    start, goal = (10, 10), (54, 10)
+    from_goal = distance_field(free, goal)
+    label = geodesic_label(distance_field(free, start), from_goal, goal)
+    directions = travel_directions(from_goal, label)
+    assert directions.shape == (2, 16, 16)
+    length = np.hypot(*directions)
+    assert ((abs(length - 1) < 1e-5) | (length == 0)).all()
+    # Down to the end of the wall, and up again behind it.
+    for row, column, end in ((2, 2, (30.5, 48)), (9, 5, (30.5, 48)), (8, 9, (54.5, 10.5))):
+        vector = np.array(end) - (4 * column + 2, 4 * row + 2)
+        cosine = directions[:, row, column] @ vector / np.linalg.norm(vector)
+        assert cosine > 0.999
+    assert (travel_directions(from_goal, np.zeros_like(label)) == 0).all()
+    inside = label.reshape(16, 4, 16, 4).mean((1, 3)) > 0.5
+    assert (length[inside] > 0).all()

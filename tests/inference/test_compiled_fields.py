@@ -8,9 +8,10 @@ torch = pytest.importorskip("torch")
 from helpers.patches import generator
 
 from cbagan_ompl import GridMap
+from cbagan_ompl.inference.choice import make_pipeline
 from cbagan_ompl.inference.compiled_fields import distance_fields
 from cbagan_ompl.inference.graphs import TorchGraphs
-from cbagan_ompl.inference.pipelines import WavefrontPipeline, WholePipeline, make_pipeline
+from cbagan_ompl.inference.pipelines import WavefrontPipeline, WholePipeline
 from cbagan_ompl.inference.predictor import Predictor
 from cbagan_ompl.networks import wavefront
 from cbagan_ompl.networks.export_model import RegionModel, make_region_model
@@ -62,8 +63,8 @@ def test_a_model_in_parts_computes_what_the_whole_does(shape: tuple[int, int]) -
         start, goal = (rng.random((3, 2)) * shape[::-1] for _ in range(2))
         points = start.astype(np.float32), goal.astype(np.float32)
         with torch.inference_mode():
-            expected = whole.probabilities(whole.read_maps(free), *points)
-            result = parts.probabilities(parts.read_maps(free), *points)
+            expected = whole.paint(whole.read_maps(free), *points).region
+            result = parts.paint(parts.read_maps(free), *points).region
         assert result.shape == (3, *shape)
         np.testing.assert_allclose(result, expected, rtol=0, atol=1e-5)
 

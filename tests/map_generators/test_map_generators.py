@@ -5,12 +5,14 @@ from __future__ import annotations
 import importlib.util
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
 from cbagan_ompl.errors import ConfigError
 from cbagan_ompl.map_generators import MAP_GENERATORS, MIN_SIZE, bug_trap, narrow_passage
 from cbagan_ompl.map_generators.randomization import randomized_map
+from cbagan_ompl.map_generators.shapes import inflate
 from cbagan_ompl.maps.grid_map import GridMap
 from cbagan_ompl.maps.loading import bundled_folder, bundled_maps
 
@@ -32,11 +34,16 @@ FREE_FRACTIONS = {
     "cell_maze": (0.4, 0.98),
     "city": (0.15, 0.98),
     "curved_walls": (0.2, 0.99),
+    "fine_maze": (0.02, 0.92),
     "halls": (0.1, 0.9),
     "offices": (0.4, 0.99),
     "race_track": (0.04, 0.4),
+    "random_pixels": (0.1, 0.8),
+    "reduced_map": (0.02, 0.9),
     "room_grid": (0.6, 0.98),
+    "scanned_map": (0.02, 0.99),
     "shelves": (0.35, 0.99),
+    "slanted_walls": (0.05, 0.99),
 }
 FOLLOWING = sorted(set(MAP_GENERATORS) - set(FREE_FRACTIONS))
 SIZES = [(MIN_SIZE, MIN_SIZE), (64, 150), (220, 96)]
@@ -153,3 +160,24 @@ def test_bundled_maps_are_what_the_script_generates(script):
     assert shipped == script.tasks_csv()
     poses = (bundled_folder() / "car_tasks.csv").read_text(encoding="utf-8")
     assert poses == script.car_tasks_csv()
+
+
+def test_passages_of_fine_mazes_have_a_pixel_or_few():
+    for seed in range(10):
+        free = MAP_GENERATORS["fine_maze"](np.random.default_rng(seed), 96, 64)
+        # No square of 5 pixels is free, but passages lead across most of the map.
+        assert not cv2.erode(free.astype(np.uint8), np.ones((5, 5), np.uint8)).any()
+        rows, columns = np.nonzero(free)
+        assert np.ptp(rows) > 10
+        assert np.ptp(columns) > 10
+
+
+def test_inflated_maps_keep_their_distance_and_lose_their_pockets():
+    free = np.ones((40, 60), np.bool_)
+    free[:, 30] = False
+    free[10:13, 30] = True
+    inflated = inflate(free, 2.5)
+    # The door is closed, and one of both rooms is left.
+    assert inflated.sum() in (27 * 40, 28 * 40, 28 * 40 + 1, 27 * 40 + 1)
+    assert not inflated[:, 29:32].any()
+    assert inflate(free, 1.0)[11, 30]

@@ -26,6 +26,7 @@ from cbagan_ompl import (
     plan,
     tasks_of,
 )
+from cbagan_ompl.inference import model_loading
 from cbagan_ompl.planning import compat, heatmap_sources
 from cbagan_ompl.planning.heatmap_sources import resolve_auto
 from cbagan_ompl.planning.hooks import hangs_on_python_termination
@@ -388,14 +389,14 @@ def test_auto_takes_the_corridor_on_small_maps() -> None:
 
 def test_auto_takes_the_network_on_large_maps(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("torch")
-    monkeypatch.setattr(heatmap_sources, "_MOST_CORRIDOR_PIXELS", 150 * 150)
+    monkeypatch.setattr(heatmap_sources, "MOST_CORRIDOR_PIXELS", 150 * 150)
     grid = GridMap(np.ones((200, 200), bool))
     assert plan(grid, (5, 5), (190, 190), "RRT", "auto", seed=1).sampler == "learned"
 
 
 def test_auto_without_torch_takes_the_corridor(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(heatmap_sources, "_MOST_CORRIDOR_PIXELS", 150 * 150)
-    monkeypatch.setattr(heatmap_sources, "find_spec", lambda name: None)
+    monkeypatch.setattr(heatmap_sources, "MOST_CORRIDOR_PIXELS", 150 * 150)
+    monkeypatch.setattr(model_loading, "find_spec", lambda name: None)
     grid = GridMap(np.ones((200, 200), bool))
     assert resolve_auto("auto", "model.pt", grid) == ("corridor", None)
     assert resolve_auto("learned", "model.pt", grid) == ("learned", "model.pt")

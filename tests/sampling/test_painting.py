@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import pickle
+
 import cv2
 import numpy as np
 import pytest
@@ -34,3 +36,32 @@ def test_painted_values_are_those_of_a_resized_image(shape: tuple[int, int], kin
 def test_nothing_is_painted_on_obstacles_or_below_the_least_value() -> None:
     grid = GridMap([[1, 0], [1, 1]])
     assert paint_heatmap(np.array([[0.2, 0.9], [0.2, 0.2]], np.float32), grid, 0.25) is None
+
+
+def test_headings_are_those_of_the_patches_where_there_is_a_value() -> None:
+    values = np.zeros((8, 12), np.float32)
+    values[:, :8] = 1
+    directions = np.zeros((2, 2, 4), np.float32)  # the last column lies beyond the map
+    directions[:, 0, 0], directions[:, 1, 1] = (0, 1), (-1, 0)  # down, and to the left
+    free = np.ones((16, 24), np.bool_)
+    free[3, 3] = False
+    heatmap = paint_heatmap(values, GridMap(free), 0.25, directions, (2, 3))
+    assert heatmap is not None
+    heading = heatmap.heading
+    assert heading is not None
+    assert heading.dtype == np.float32
+    assert not heading.flags.writeable
+    assert heading is heatmap.heading
+    expected = np.full(free.shape, np.nan, np.float32)
+    expected[:8, :8] = np.pi / 2
+    expected[8:, 8:16] = np.pi
+    expected[3, 3] = np.nan
+    np.testing.assert_allclose(heading, expected, atol=1e-6)
+    # On a ROS map y points up, and the map is turned by the yaw of its origin.
+    turned = paint_heatmap(values, GridMap(free, 0.5, (1, 2, 0.3)), 0.25, directions, (2, 3))
+    assert turned is not None
+    assert turned.heading is not None
+    assert turned.heading[0, 0] == pytest.approx(0.3 - np.pi / 2)
+    assert turned.heading[15, 15] == pytest.approx(0.3 - np.pi + 2 * np.pi * (0.3 < 0), abs=1e-5)
+    assert pickle.loads(pickle.dumps(turned)).heading[0, 0] == turned.heading[0, 0]
+    assert turned.with_heading(None).heading is None

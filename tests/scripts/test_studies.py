@@ -120,3 +120,32 @@ def test_wrong_heatmaps(tmp_path: Path) -> None:
     planners = json.loads(report.read_text())["planners"]
     assert set(planners) == {"RRT", "RRTstar"}
     assert all(row["solved"] == 1 for rows in planners.values() for row in rows.values())
+
+
+@pytest.mark.slow
+def test_generated_maps(tmp_path: Path) -> None:
+    pytest.importorskip("torch")
+    report = tmp_path / "generated.json"
+    words = ["--model", "bundled=cbagan-worlds", "--not-learned", "--maps", "1"]
+    printed = run_script(STUDIES / "generated_maps.py", *words, "--json", str(report))
+    assert "| fine mazes |" in printed
+    result = json.loads(report.read_text())
+    assert result["models"].keys() == {"bundled", "not learned"}
+    scores = result["models"]["not learned"]
+    assert all(row["tasks"] == 4 for kind, row in scores.items() if kind != "all")
+    assert scores["all"]["connected"] > 0.9
+    assert scores["all"]["iou"] > 0.8
+    assert scores["all"]["angles"]["median"] < 0.15
+
+
+@pytest.mark.slow
+def test_overlap(tmp_path: Path) -> None:
+    pytest.importorskip("torch")
+    rows, report = tmp_path / "rows.jsonl", tmp_path / "overlap.json"
+    words = ["bundled:rooms", "--tasks-per-map", "1", "--runs", "1", "--rows", str(rows)]
+    for _ in range(2):  # the second time every run is there already
+        run_script(STUDIES / "overlap.py", *words, "--json", str(report))
+        assert len(rows.read_text().splitlines()) == 2
+    summary = json.loads(report.read_text())["rows"]
+    assert [row["way"] for row in summary] == ["uniform", "waiting", "overlap"] * 2
+    assert [row["ratio"] for row in summary[::3]] == [[1, 1, 1]] * 2

@@ -13,8 +13,15 @@ torch = pytest.importorskip("torch")
 
 from cbagan_ompl import DatasetError
 from cbagan_ompl.datasets.dataset import Dataset
+from cbagan_ompl.datasets.synthetic import SyntheticSettings, generate_map_tasks
 from cbagan_ompl.networks.config import NetworkConfig
-from cbagan_ompl.training.batches import apply_symmetry, check_trainable, make_batch, scale_down
+from cbagan_ompl.training.batches import (
+    apply_symmetry,
+    check_trainable,
+    make_batch,
+    scale_down,
+    turn_vectors,
+)
 from cbagan_ompl.training.config import TrainingConfig
 from cbagan_ompl.training.loop import train
 from cbagan_ompl.training.task_sources import DatasetSource
@@ -85,3 +92,34 @@ def test_the_smallest_images(patch: int, scales: tuple[int, ...], smallest: int)
     )
     with pytest.raises(DatasetError, match=message):
         check_trainable(smallest // 2, config)
+
+
+@pytest.mark.parametrize("code", range(8))
+def test_symmetries_turn_directions_with_the_images(code: int) -> None:
+    size = 32
+    free = np.ones((size, size), np.uint8)
+    # Two pixels, and the direction from the patch of the first one to that of the second.
+    endpoints = np.array([[6.5, 9.5], [26.5, 17.5]], np.float32)
+    vectors = np.zeros((2, size // 4, size // 4), np.float16)
+    step = endpoints[1] - endpoints[0]
+    vectors[:, 2, 1] = step
+    _, _, moved = apply_symmetry(code, free, free, endpoints)
+    turned = turn_vectors(code, vectors)
+    column, row = (moved[0] // 4).astype(int)
+    assert turned[:, row, column].tolist() == (moved[1] - moved[0]).tolist()
+    assert (turned != 0).any(0).sum() == 1
+
+
+def test_batches_of_tasks_with_directions() -> None:
+    tasks = generate_map_tasks(SyntheticSettings(size=64), 0, 0)
+    assert tasks.direction is not None
+    batch = make_batch(tasks, np.arange(4), CPU)
+    assert torch.equal(batch.direction, torch.from_numpy(tasks.direction[:4]).float())
+    assert scale_down(batch, 2).direction.shape == (4, 2, 8, 8)
+    rng = np.random.default_rng(0)
+    # Of the way back nothing is known.
+    swapped = make_batch(tasks, np.arange(4).repeat(8), CPU, rng, reversal=True)
+    known = (swapped.direction != 0).flatten(1).any(1)
+    first = torch.from_numpy(tasks.start[:4].repeat(8, axis=0))
+    assert torch.equal(known, (swapped.start == first).all(1))
+    assert 0 < known.sum() < len(known)

@@ -86,3 +86,19 @@ def test_adaptive_weights_follow_the_errors_of_the_discriminators() -> None:
 def test_adaptive_weights_of_discriminators_without_error() -> None:
     assert losses.adaptive_weights(0.0, 0.0, alpha=3.0) == pytest.approx((0.75, 0.25))
     assert losses.adaptive_weights(0.0, 0.1, alpha=3.0) == (0, 1)
+
+
+def test_direction_loss_weighs_patches_by_the_region_and_by_what_is_known() -> None:
+    region = torch.zeros(1, 1, 8, 8)
+    region[..., :4, :4], region[..., 4:, :4] = 1, 0.5
+    target = torch.zeros(1, 2, 2, 2)
+    target[0, 0] = 1  # to the right
+    target[0, 0, 1, 0] = 0.5
+    vectors = target.sign()
+    assert losses.direction_loss(vectors, target, region).item() == pytest.approx(0)
+    vectors[0, :, 1, 0] = torch.tensor([0.0, 1.0])
+    # A right angle costs 1, at a quarter of the weight of the patch that is right.
+    assert losses.direction_loss(vectors, target, region).item() == pytest.approx(0.25 / 1.25)
+    vectors[0, :, :, 1] = torch.tensor([[-1.0], [0.0]])  # outside of the region
+    assert losses.direction_loss(vectors, target, region).item() == pytest.approx(0.25 / 1.25)
+    assert losses.direction_loss(vectors, 0 * target, region).item() == 0

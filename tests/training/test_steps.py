@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import copy
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,10 +10,12 @@ from helpers.tiny_model import TINY
 torch = pytest.importorskip("torch")
 
 from cbagan_ompl.datasets.dataset import Dataset
+from cbagan_ompl.datasets.synthetic import SyntheticSettings, generate_map_tasks
+from cbagan_ompl.networks.config import NetworkConfig
 from cbagan_ompl.networks.encoding import region_probability
 from cbagan_ompl.training import losses
 from cbagan_ompl.training.batches import Batch, Images, encode, make_batch
-from cbagan_ompl.training.gan import Gan
+from cbagan_ompl.training.gan import Gan, Painted
 from cbagan_ompl.training.steps import adversarial_weights, discriminator_step, generator_step
 
 CPU = torch.device("cpu")
@@ -50,7 +53,7 @@ def test_steps_change_the_weights_that_they_train(dataset: Dataset) -> None:
     after = weights(gan)
     assert [changed(before[name], after[name]) for name in NAMES] == [False, True, True]
 
-    parts = generator_step(gan, TINY, batch, images, fake, (0.5, 0.5))
+    parts = generator_step(gan, TINY, batch, images, Painted.of(fake), (0.5, 0.5))
     assert parts["adversarial"] > 0
     last = weights(gan)
     assert [changed(after[name], last[name]) for name in NAMES] == [True, False, False]
@@ -86,7 +89,7 @@ def test_the_generator_descends_the_papers_loss(dataset: Dataset) -> None:
     )
     loss = 0.7 * adversarial + 3 * pixel + segmentation
     expected = torch.autograd.grad(loss, list(gan.generator.parameters()), retain_graph=True)
-    parts = generator_step(gan, config, batch, images, fake, (0.8, 0.2))
+    parts = generator_step(gan, config, batch, images, Painted.of(fake), (0.8, 0.2))
     assert parts["adversarial"] == pytest.approx(adversarial.item(), rel=1e-6)
     assert parts["pixel"] == pytest.approx(pixel.item(), rel=1e-6)
     assert on_map.item() != pytest.approx(on_points.item(), rel=1e-3)
@@ -101,7 +104,7 @@ def test_the_discriminators_reach_the_generator(dataset: Dataset) -> None:
     images = encode(batch)
     before = weights(gan)["generator"]
     fake = gan.generator(images.map, images.points, torch.zeros_like(batch.free))
-    generator_step(gan, config, batch, images, fake, (0.5, 0.5))
+    generator_step(gan, config, batch, images, Painted.of(fake), (0.5, 0.5))
     assert changed(before, weights(gan)["generator"])
 
 
@@ -113,7 +116,7 @@ def test_the_recipes_weights_reach_the_segmentation_loss(dataset: Dataset) -> No
     images = encode(batch)
     fake = gan.generator(images.map, images.points, torch.zeros_like(batch.free))
     expected = losses.segmentation_loss(region_probability(fake), batch.region, 2, 3, 4, 5).item()
-    parts = generator_step(gan, config, batch, images, fake, None)
+    parts = generator_step(gan, config, batch, images, Painted.of(fake), None)
     assert parts["segmentation"] == pytest.approx(expected)
 
 
@@ -124,7 +127,7 @@ def test_long_gradients_are_shortened(dataset: Dataset, limit: float) -> None:
     batch = make_batch(dataset.train, np.arange(4), CPU)
     images = encode(batch)
     fake = gan.generator(images.map, images.points, torch.zeros_like(batch.free))
-    generator_step(gan, config, batch, images, fake, None)
+    generator_step(gan, config, batch, images, Painted.of(fake), None)
     gradients = [w.grad for w in gan.generator.parameters() if w.grad is not None]
     norm = float(torch.linalg.vector_norm(torch.cat([g.flatten() for g in gradients])))
     if limit:
@@ -138,3 +141,31 @@ def test_adaptive_weights_of_a_recipe() -> None:
     assert adversarial_weights(TINY, errors) == (0.5, 0.5)
     adaptive = TINY.updated({"adaptive_alpha": 3})
     assert adversarial_weights(adaptive, errors) == pytest.approx((0.6, 0.4))
+
+
+def test_directions_are_trained_where_they_are_known() -> None:
+    network = NetworkConfig(widths=(4, 4), stem=4, patch=4, passages=True, white_obstacles=True)
+    config = replace(TINY, network=network, adversarial_weight=0.0, direction_weight=3.0)
+    tasks = generate_map_tasks(SyntheticSettings(size=64), 0, 1)
+    batch = make_batch(tasks, np.arange(4), CPU)
+    gan, images = Gan(config, CPU), encode(batch)
+    painted = gan.generate(images.map, images.points, torch.zeros_like(batch.free))
+    assert painted.direction is not None
+    parts = {
+        "pixel": losses.pixel_loss(painted.image, images.region) * config.pixel_weight,
+        "segmentation": losses.segmentation_loss(
+            region_probability(painted.image),
+            batch.region,
+            config.bce_weight,
+            config.dice_weight,
+            config.dice_smooth,
+        ),
+        "direction": 3 * losses.direction_loss(painted.direction, batch.direction, batch.region),
+    }
+    weights = list(gan.generator.parameters())
+    loss = torch.stack(list(parts.values())).sum()
+    expected = torch.autograd.grad(loss, weights, retain_graph=True, allow_unused=True)
+    values = generator_step(gan, config, batch, images, painted, None)
+    assert 3 * values["direction"] == pytest.approx(parts["direction"].item(), rel=1e-5)
+    for gradient, weight in zip(expected, weights, strict=True):
+        torch.testing.assert_close(weight.grad, gradient)
