@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import argparse
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -139,20 +139,27 @@ def print_result(result: Mapping[str, Any]) -> None:
         f"threshold {result['threshold']:.3f}; coverage {result['generated']['all']:.3f} of "
         f"{result['generated']['tasks']} generated tasks, expected {low:.3f} to {high:.3f}"
     )
-    rows: list[Sequence[str]] = [
-        (
-            name,
-            f"{result['generated']['families'][name]:.2f}",
-            f"{own:.3f}",
-            f"{result['generated_by_family'][name]:.2f}",
-        )
-        for name, own in result["families"].items()
-    ]
-    print(table(("family", "coverage", "own threshold", "its coverage"), rows))
+    print(calibration_table(result))
     if "files" in result:
-        rows = [(name, f"{value:.2f}") for name, value in result["files"]["families"].items()]
-        rows.append((f"all {result['files']['tasks']}", f"{result['files']['all']:.3f}"))
-        print(table(("family of the files", "coverage"), rows))
+        print(files_table(result))
+
+
+def calibration_table(result: Mapping[str, Any]) -> str:
+    """Return the thresholds and their coverage on generated maps as a table of Markdown."""
+    test = result["generated"]
+    rows = [("all", f"{result['threshold']:.3f}", f"{test['all']:.1%}", "")]
+    for name, own in result["families"].items():
+        covered = f"{result['generated_by_family'][name]:.0%}"
+        rows.append((name, f"{own:.3f}", f"{test['families'][name]:.0%}", covered))
+    header = ("maps", "own threshold", "coverage of that of all", "of the own one")
+    return table(header, rows)
+
+
+def files_table(result: Mapping[str, Any]) -> str:
+    """Return the coverage on the maps of files as a table of Markdown."""
+    files = result["files"]
+    rows = [(name, f"{value:.0%}") for name, value in files["families"].items()]
+    return table(("maps", "coverage"), [*rows, (f"all {files['tasks']}", f"{files['all']:.1%}")])
 
 
 if __name__ == "__main__":

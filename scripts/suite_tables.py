@@ -28,11 +28,21 @@ def suite_tables() -> dict[str, Callable[[], str]]:
     """Return what makes the tables of each suite: ratios for each OMPL, and milliseconds."""
     makers: dict[str, Callable[[], str]] = {}
     for suite in SUITES:
-        for version in VERSIONS:
-            name = f"{suite}_ompl_{version}"
-            makers[name] = partial(lambda name: ratios_table(read(f"{name}.json")), name)
+        makers[suite] = partial(suite_ratios, suite)
         makers[f"{suite}_times"] = partial(suite_times, suite)
     return makers
+
+
+def versions_of(suite: str) -> list[str]:
+    """Return the versions of OMPL for which a suite has results."""
+    return [one for one in VERSIONS if (RESULTS / f"{suite}_ompl_{one}.json").exists()]
+
+
+def suite_ratios(suite: str) -> str:
+    return "\n\n".join(
+        f"OMPL {version}:\n\n{ratios_table(read(f'{suite}_ompl_{version}.json'))}"
+        for version in versions_of(suite)
+    )
 
 
 def suite_times(suite: str) -> str:
@@ -56,7 +66,7 @@ def conditions() -> str:
     """Return what the suites ran with: tasks, runs, choices of ``auto``."""
     rows = []
     for suite in SUITES:
-        for version in VERSIONS:
+        for version in versions_of(suite):
             summary = read(f"{suite}_ompl_{version}.json")
             settings = summary["settings"]
             auto = ", ".join(f"{name} ({n})" for name, n in sorted(summary["auto"].items()))
@@ -75,7 +85,7 @@ def rrtconnect() -> str:
                 for sampler, row in samplers.items():
                     ratio = "{:.2f} [{:.2f}, {:.2f}]".format(*row["processor_ratio"])
                     times = [
-                        f"{row[f'{clock}_ms{of}']:.2g} ms"
+                        f"{row[f'{clock}_ms{of}']:.3g} ms"
                         for clock in ("clock", "processor")
                         for of in ("", "_p90")
                     ]

@@ -18,11 +18,12 @@ from ..maps.checks import check_grid
 from ..maps.grid_map import GridMap
 from ..maps.grid_search import prepare_search
 from ..networks.config import MAX_IMAGE_SIZE
-from ..robots.poses import position_map, position_of
+from ..robots.poses import passable_map, position_map, position_of
 from ..robots.robot import Robot
 from ..sampling.bridges import connect
 from ..sampling.guarantee import Guarantee
 from ..sampling.heatmap import Heatmap
+from ..sampling.robot_heatmaps import on_positions
 from .bundled_models import find_model
 from .choice import make_pipeline
 from .graphs import TorchGraphs
@@ -214,17 +215,20 @@ class Predictor:
         starts, goals = _list_points("starts", starts), _list_points("goals", goals)
         if len(starts) != len(goals):
             raise TaskError(f"each task has a start and a goal, got {len(starts)} and {len(goals)}")
+        maps = [grid] * len(starts)
         if robot is not None:
-            grid = position_map(grid, robot)
             starts = [position_of(robot, "start", start) for start in starts]
             goals = [position_of(robot, "goal", goal) for goal in goals]
-        return [
-            heatmap
-            for i in range(0, len(starts), _BATCH)
-            for heatmap in self._predict(
-                grid, starts[i : i + _BATCH], goals[i : i + _BATCH], repair
-            )
-        ]
+            maps = [passable_map(grid, robot, *task) for task in zip(starts, goals, strict=True)]
+            grid = position_map(grid, robot)
+        heatmaps: dict[int, Heatmap] = {}
+        for one in dict.fromkeys(maps):
+            tasks = [task for task, its_map in enumerate(maps) if its_map is one]
+            for first in range(0, len(tasks), _BATCH):
+                batch = tasks[first : first + _BATCH]
+                ends = [starts[task] for task in batch], [goals[task] for task in batch]
+                heatmaps.update(zip(batch, self._predict(one, *ends, repair), strict=True))
+        return [on_positions(heatmaps[task], grid) for task in range(len(maps))]
 
     def _predict(
         self, grid: GridMap, starts: list[ArrayLike], goals: list[ArrayLike], repair: bool

@@ -8,6 +8,7 @@ from typing import Any
 from ..sampling.sampler import HeatmapSampler
 from .awaited import AwaitedHeatmap
 from .compat import ob
+from .goal_approach import GoalApproach, goal_approach
 from .goal_monitor import GoalMonitor
 from .states import StateAccess
 
@@ -50,11 +51,12 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
         self._monitor = monitor
         self._awaited: AwaitedHeatmap | None = None
         self._sampler: HeatmapSampler
+        self._approach: GoalApproach | None = None
         if isinstance(source, AwaitedHeatmap):
             self._awaited = source
             source.hand_to(self._follow)
         else:
-            self._sampler = source
+            self._take(source)
 
     def distanceGoal(self, state: Any) -> float:  # noqa: N802
         """Return the distance to the original goal; planners ask it for every new node."""
@@ -104,12 +106,20 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
             self._sampler.begin()
         if not sampling or (not monitor.has_solution and self._is_goals_turn()):
             self._original.sampleGoal(state)
+        elif not monitor.has_solution and self._approach is not None and self._approach.is_due():
+            self._original.sampleGoal(state)
+            self._approach.move_back(state)
         else:
             self._states.write(state, *self._sampler.next())
 
+    def _take(self, sampler: HeatmapSampler) -> None:
+        self._sampler = sampler
+        self._approach = goal_approach(self.getSpaceInformation().getStateSpace(), sampler)
+
     def _follow(self, sampler: HeatmapSampler, states: StateAccess) -> None:
         """Sample a heat map from now on."""
-        self._sampler, self._states, self._awaited = sampler, states, None
+        self._take(sampler)
+        self._states, self._awaited = states, None
         self._monitor.set_injected_fraction(1.0)
 
     def _is_goals_turn(self) -> bool:

@@ -272,7 +272,7 @@ class BenchmarkSession:
         positions = [endpoint[:2] for endpoint in self._endpoints]
         for sampler, source in self._sources.items():
             began = perf_counter()
-            heatmap = source(self._workspace.grid, *positions)
+            heatmap = self._workspace.adapt(source)(self._workspace.grid, *positions)
             self._heatmaps[sampler] = heatmap, perf_counter() - began
 
     def before_run(self, planner: Any) -> None:

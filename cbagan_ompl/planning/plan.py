@@ -15,12 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..common.validation import (
     finite_number,
-    is_finite_number,
     positive_number,
     truth_value,
     whole_number,
 )
-from ..errors import ConfigError, MapError, RobotError, show
+from ..errors import ConfigError, MapError, show
 from ..maps.endpoints import Moves
 from ..maps.grid_map import GridMap
 from ..robots.robot import Robot
@@ -32,6 +31,7 @@ from .compat import ou
 from .goals import heatmap_of_goals, reached_goal, set_goals, split_goals
 from .heatmap_sources import (
     LEARNED,
+    OWN_HEATMAP,
     UNIFORM,
     HeatmapSource,
     heatmap_source,
@@ -49,7 +49,7 @@ from .problem import (
 )
 from .solving import Limits, SolveRecord, solve
 from .states import state_access
-from .workspace import Workspace
+from .workspace import Workspace, robot_of
 
 if TYPE_CHECKING:
     from ..inference.predictor import Predictor
@@ -136,7 +136,7 @@ def plan(
     if not isinstance(grid, GridMap | str | PathLike):
         raise MapError(f"grid is a GridMap or the file of a map, got {show(grid)}")
     source = grid if isinstance(grid, GridMap) else GridMap.load(grid)
-    workspace = Workspace(source, _robot_of(robot, radius))
+    workspace = Workspace(source, robot_of(robot, radius))
     goals = split_goals(goal)
     moves: Moves = {}
     distance = finite_number("snap", snap, 0.0)
@@ -206,21 +206,6 @@ class _Job:
     keep_tree: bool
 
 
-def _robot_of(robot: Robot | None, radius: float) -> Robot:
-    """Return the robot that is meant by both options."""
-    if robot is not None and not isinstance(robot, Robot):
-        raise RobotError(
-            f"robot is a Robot, such as Robot.rectangle(length, width), got {show(robot)}"
-        )
-    if not is_finite_number(radius) or radius < 0:
-        raise MapError(f"the robot radius must be a length of at least 0, got {show(radius)}")
-    if radius == 0:
-        return robot or Robot.point()
-    if robot is not None:
-        raise RobotError("give robot or radius, which is short for robot=Robot.disc(radius)")
-    return Robot.disc(radius)
-
-
 def _with_seed(options: SamplerOptions) -> tuple[SamplerOptions, int]:
     """Return options with a seed, and the seed that is OMPL's as well."""
     if isinstance(options.seed, np.random.Generator):
@@ -267,8 +252,10 @@ class _Times:
 
 def _make_heatmap(job: _Job) -> Heatmap:
     assert job.make_heatmap is not None, "it is asked for"
-    goals = [goal[:2] for goal in job.goals]
-    heatmap = heatmap_of_goals(job.make_heatmap, job.workspace.grid, job.start[:2], goals)
+    source, goals = job.make_heatmap, [goal[:2] for goal in job.goals]
+    if job.sampler != OWN_HEATMAP:
+        source = job.workspace.adapt(source)
+    heatmap = heatmap_of_goals(source, job.workspace.grid, job.start[:2], goals)
     follows_heading = job.options.heading.uniform_fraction < 1
     # Made here, because with overlap here is beside the planner.
     if job.workspace.robot.has_heading and heatmap.heading is None and follows_heading:

@@ -8,22 +8,17 @@ from typing import Any
 import numpy as np
 
 from ..sampling.adaptation import AdaptiveMixture
-from ..sampling.budget import (
-    ADVANCE_WITH_TREE,
-    EARNED_BY_UNIFORM_UNSEEN,
-    EARNED_BY_UNIFORM_WITH_TREE,
-    LearnedBudget,
-)
 from ..sampling.headings import HeadingSampler
 from ..sampling.heatmap import Heatmap
 from ..sampling.options import SamplerOptions
 from ..sampling.roadmap import RoadmapMixture
 from ..sampling.sampler import HeatmapSampler
 from .attachable import check_frames
-from .hooks import BOUNDS_STEERING, GOAL_INJECTION, samples_are_nodes, stops_at_first
+from .hooks import BOUNDS_STEERING, GOAL_INJECTION, samples_are_nodes
 from .monitor import PlannerMonitor
 from .planner_kinds import plans_controls
 from .pose_headings import with_headings
+from .sample_budget import budget_of, needs_many_poses
 from .states import StateAccess, drives_backwards, position_bounds, state_access
 
 # OMPL's range of a planner that was given none, as a fraction of the extent of the space.
@@ -75,17 +70,21 @@ class SamplerMaker:
         heatmap = with_headings(setup, heatmap, options.heading)
         headings = HeadingSampler(heatmap, options.heading, rng, drives_backwards(space))
         states = state_access(space, headings)
-        budget = self._budget(planner) if options.adaptation.stagnation else None
+        adaptation, budget = options.adaptation, None
+        if adaptation.stagnation:
+            budget = budget_of(planner, sees_nodes=self.hook in SEES_TREE)
+        if needs_many_poses(planner):  # what is no progress in position may be one in heading
+            adaptation = replace(adaptation, stagnation=False)
         mixture: AdaptiveMixture | RoadmapMixture | None = None
         if self.hook in SEES_TREE:
             reach = _reach_of(planner)
-            mixture = AdaptiveMixture(heatmap, options.adaptation, reach, monitor, budget)
-        elif samples_are_nodes(self.name) and options.adaptation.coverage:
+            mixture = AdaptiveMixture(heatmap, adaptation, reach, monitor, budget)
+        elif samples_are_nodes(self.name) and adaptation.coverage:
             mixture = RoadmapMixture(heatmap, _reach_of(planner), budget)
         sampler = HeatmapSampler(heatmap, replace(options, seed=rng), monitor, mixture, budget)
         sampler.keep_inside(*position_bounds(space))
         sampler.prepare()
-        if mixture is not None and options.adaptation.connectivity:
+        if mixture is not None and adaptation.connectivity:
             monitor.prepare(heatmap, self.starts)
         return sampler, states
 
@@ -96,13 +95,6 @@ class SamplerMaker:
             for x, y in self.monitor.node_positions():
                 made[0].on_new_node(x, y, False)
         return made
-
-    def _budget(self, planner: Any) -> LearnedBudget:
-        if self.hook in SEES_TREE:
-            return LearnedBudget(EARNED_BY_UNIFORM_WITH_TREE, advance=ADVANCE_WITH_TREE)
-        if stops_at_first(self.name) or hasattr(planner, "bestCost"):
-            return LearnedBudget()
-        return LearnedBudget(EARNED_BY_UNIFORM_UNSEEN, is_halved=False)
 
 
 def _reach_of(planner: Any) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -11,12 +12,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import TaskError
+from ..common.validation import is_finite_number
+from ..errors import MapError, RobotError, TaskError, show
 from ..maps.endpoints import Moves, snap_endpoints
 from ..maps.grid_map import GridMap
 from ..robots.poses import check_poses, position_map, snap_poses
 from ..robots.robot import Robot
 from ..robots.shape_checker import ShapeChecker
+from ..sampling.heatmap import Heatmap
+from ..sampling.robot_heatmaps import robot_heatmap
 from . import compat
 from .robot_validity import RobotMotionValidator, RobotValidityChecker
 from .states import read_pose
@@ -73,6 +77,19 @@ class Workspace:
                     "x, y alone, or a robot with a shape or a turning radius"
                 )
         return self.grid.check_task(start, goal)
+
+    def adapt(
+        self, source: Callable[[GridMap, ArrayLike, ArrayLike], Heatmap]
+    ) -> Callable[[GridMap, ArrayLike, ArrayLike], Heatmap]:
+        """Return a source of heat maps that looks for ways on which the robot fits.
+
+        Args:
+            source: makes the heat map of a point on a map.
+
+        Returns:
+            The same for the robot, on :attr:`grid`, whichever map it is given.
+        """
+        return lambda _, start, goal: robot_heatmap(source, self.source, self.robot, start, goal)
 
     def snap(self, start: ArrayLike, goal: ArrayLike, distance: float) -> tuple[Endpoints, Moves]:
         """Return start and goal, each moved to the nearest place where the robot may be.
@@ -179,3 +196,31 @@ def _has_yaw(point: ArrayLike) -> bool:
         return np.shape(point) == (3,)
     except Exception:  # rows of different lengths, or whatever the class raises
         return False
+
+
+def robot_of(robot: Robot | None, radius: float) -> Robot:
+    """Return the robot that is meant by two options.
+
+    Args:
+        robot: what moves, or None.
+        radius: that of a disc, or 0.
+
+    Raises:
+        RobotError: no robot, or both are given.
+        MapError: no radius.
+
+    Example:
+        >>> robot_of(None, 0.5) == Robot.disc(0.5)
+        True
+    """
+    if robot is not None and not isinstance(robot, Robot):
+        raise RobotError(
+            f"robot is a Robot, such as Robot.rectangle(length, width), got {show(robot)}"
+        )
+    if not is_finite_number(radius) or radius < 0:
+        raise MapError(f"the robot radius must be a length of at least 0, got {show(radius)}")
+    if radius == 0:
+        return robot or Robot.point()
+    if robot is not None:
+        raise RobotError("give robot or radius, which is short for robot=Robot.disc(radius)")
+    return Robot.disc(radius)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..common.validation import is_finite_number
-from ..errors import TaskError, show
+from ..errors import MapError, TaskError, show
 from ..maps.endpoints import Moves, check_position
 from ..maps.grid_map import GridMap
 from .robot import Robot, check_robot
@@ -46,6 +46,37 @@ def position_map(grid: GridMap, robot: Robot) -> GridMap:
     return grid.inflated(max(0.0, robot.inscribed_radius - np.sqrt(2) * grid.resolution))
 
 
+def passable_map(grid: GridMap, robot: Robot, start: ArrayLike, goal: ArrayLike) -> GridMap:
+    """Return the map on which a way for a robot is to be looked for.
+
+    On the map of positions a way may lead through gaps that the robot does not fit through. So it
+    is the map inflated by the whole inscribed radius, if that still connects start and goal.
+
+    Args:
+        grid: the map.
+        robot: the robot.
+        start: (x, y), world.
+        goal: (x, y), world.
+
+    Returns:
+        Otherwise, and for robots without heading, the map of positions.
+
+    Example:
+        >>> grid = GridMap.load("bundled:rooms")
+        >>> passable_map(grid, Robot.rectangle(12, 6), (20, 20), (230, 230)).name
+        'rooms (inflated by 3)'
+    """
+    positions = position_map(grid, robot)
+    if not robot.has_heading:
+        return positions
+    try:
+        passable = grid.inflated(robot.inscribed_radius)
+        passable.check_task(start, goal)
+    except (MapError, TaskError):
+        return positions
+    return passable
+
+
 def position_of(robot: Robot, role: str, endpoint: ArrayLike) -> ArrayLike:
     """Return the position of an endpoint, which may be a pose where the robot has a heading.
 
@@ -55,12 +86,14 @@ def position_of(robot: Robot, role: str, endpoint: ArrayLike) -> ArrayLike:
         endpoint: (x, y), world; or (x, y, yaw), radians.
 
     Raises:
+        RobotError: no robot.
         TaskError: a pose that is none.
 
     Example:
         >>> position_of(Robot.rectangle(4, 2), "start", (4, 4, 0))
         array([4., 4.])
     """
+    check_robot(robot)
     is_pose = robot.has_heading and np.shape(endpoint) == (3,)
     return check_pose(role, endpoint)[:2] if is_pose else endpoint
 

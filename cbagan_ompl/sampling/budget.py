@@ -14,6 +14,9 @@ EARNED_BY_UNIFORM_WITH_TREE = 0.5
 #: The same for planners of which it is not known when they have a path: half of their samples
 #: stay learned, since a good heat map also shortens a path.
 EARNED_BY_UNIFORM_UNSEEN = 1.0
+#: The same for planners of poses, which need many samples in a part of the region before one of
+#: them has a heading with which the robot gets through.
+EARNED_BY_UNIFORM_POSE = 4.0
 #: Learned samples that a node in a new part of the region earns.
 EARNED_BY_NODE = 4
 

@@ -16,7 +16,6 @@ from ..maps.connectivity import in_one_component
 from ..maps.endpoints import check_point
 from ..maps.grid_map import GridMap
 from ..maps.grid_search import pull_taut, shortest_path
-from ..robots.poses import position_map, position_of
 from ..robots.robot import Robot
 from .bands import half_width, paint_band
 from .bridges import connect
@@ -26,6 +25,7 @@ from .heatmap_files import read_heatmap_values
 from .heatmap_values import to_unit_range
 from .options import HeadingSpread
 from .pixels import pixel_pair, sample_in_pixels, sample_pixels
+from .robot_heatmaps import robot_heatmap
 
 #: A pixel whose value is at least this belongs to the promising region.
 REGION_THRESHOLD = 0.5
@@ -186,8 +186,7 @@ class Heatmap:
         """
         check_grid(grid, HeatmapError)
         if robot is not None:
-            grid = position_map(grid, robot)
-            start, goal = position_of(robot, "start", start), position_of(robot, "goal", goal)
+            return robot_heatmap(cls.corridor, grid, robot, start, goal)
         endpoints = grid.to_pixel(grid.check_task(start, goal))
         pixels = shortest_path(grid.free, *pixel_pair(endpoints))
         assert pixels is not None, "check_task has made sure that a path exists"

@@ -100,6 +100,9 @@ class HeadingSpread:
             probabilistically complete; with 1 the headings of the heat map are not used at all.
         reverse_fraction: fraction of the other samples whose heading is turned by pi, from 0 to 1,
             for robots that drive backwards as well (ReedsSheppStateSpace).
+        approach_fraction: fraction of a planner's samples before its first path, from 0 to 1, that
+            are poses from which the goal is reached along one arc, for robots with a turning
+            radius, where goal injection reaches the planner. None if all headings are uniform.
 
     Raises:
         ConfigError: a value of the wrong type or out of range; the message names the option.
@@ -112,10 +115,11 @@ class HeadingSpread:
     spread: float = 0.4
     uniform_fraction: float = 0.2
     reverse_fraction: float = 0.2
+    approach_fraction: float = 0.1
 
     def __post_init__(self) -> None:
-        given = self.spread, self.uniform_fraction, self.reverse_fraction
-        spread, uniform, reverse = map(to_float, given)
+        given = [getattr(self, field.name) for field in fields(self)]
+        spread, uniform, reverse, approach = map(to_float, given)
         if not 0 < spread <= pi:
             raise ConfigError(
                 "the spread of headings is a number of radians above 0, at most pi, got "
@@ -127,12 +131,13 @@ class HeadingSpread:
                 f"{LEAST_UNIFORM_FRACTION:g} to 1, got {show(self.uniform_fraction)}; it cannot be "
                 "0, because the planner would lose probabilistic completeness"
             )
-        if not 0 <= reverse <= 1:
-            raise ConfigError(
-                f"the reverse_fraction of headings is a fraction from 0 to 1, got "
-                f"{show(self.reverse_fraction)}"
-            )
-        for field, value in zip(fields(self), (spread, uniform, reverse), strict=True):
+        for name, fraction in (("reverse_fraction", reverse), ("approach_fraction", approach)):
+            if not 0 <= fraction <= 1:
+                raise ConfigError(
+                    f"the {name} of headings is a fraction from 0 to 1, got "
+                    f"{show(getattr(self, name))}"
+                )
+        for field, value in zip(fields(self), (spread, uniform, reverse, approach), strict=True):
             object.__setattr__(self, field.name, value)
 
 

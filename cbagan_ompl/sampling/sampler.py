@@ -35,6 +35,7 @@ class HeatmapSampler:
         rng: the generator of the samples, and of whatever else belongs to the same run.
         chance: returns a random number of ``rng`` in [0, 1) at each call.
         monitor: of the planner that is fed.
+        spread: how the headings of poses follow those of the heat map.
 
     Args:
         heatmap: what to sample.
@@ -73,7 +74,7 @@ class HeatmapSampler:
         self.chance = Random(int(self.rng.integers(2**63))).random
         self._uniform_fraction = float(options.uniform_fraction)
         self._exponent = np.float32(1.0 if options.sharpness is None else options.sharpness)
-        self._spread = options.heading
+        self.spread = options.heading
         self.monitor = monitor or NoMonitor()
         self._mixture = mixture
         self._budget = budget
@@ -97,7 +98,7 @@ class HeatmapSampler:
         Args:
             reverses: whether the robot drives backwards as well.
         """
-        return HeadingSampler(self.heatmap, self._spread, self.rng, reverses)
+        return HeadingSampler(self.heatmap, self.spread, self.rng, reverses)
 
     def keep_inside(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> None:
         """Sample only inside a box, such as the bounds of a state space.

@@ -29,6 +29,34 @@ def test_search_speed(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_inference_speed(tmp_path: Path) -> None:
+    pytest.importorskip("torch")
+    words = ("--sizes", "64", "--model", "cbagan", "--json", str(tmp_path / "speed.json"))
+    assert "| 64 px | cbagan |" in run_script(SCRIPTS / "inference_speed.py", *words)
+    row = json.loads((tmp_path / "speed.json").read_text())["sizes"]["64"]["cbagan"]
+    assert set(row) == {"first", "next", "of 64"}
+    assert min(row.values()) > 0
+
+
+@pytest.mark.slow
+def test_calibrate(tmp_path: Path) -> None:
+    pytest.importorskip("torch")
+    tasks = tmp_path / "tasks.csv"
+    tasks.write_text("map,start_x,start_y,goal_x,goal_y,family\nrooms,20,20,230,230,indoors\n")
+    words = ["cbagan", "bundled:rooms", "--tasks", str(tasks), "--maps", "2"]
+    printed = run_script(
+        SCRIPTS / "calibrate.py", *words, "--probability", "0.6", "--json", str(tmp_path / "c.json")
+    )
+    result = json.loads((tmp_path / "c.json").read_text())
+    assert "coverage" in printed
+    assert set(result["files"]["families"]) == {"indoors"}
+    assert result["maps"] == result["generated"]["tasks"] == 2 * len(result["families"])
+    assert 0 <= result["threshold"] <= 1
+    low, high = result["interval"]
+    assert 0 < low < 0.6 < high < 1
+
+
+@pytest.mark.slow
 def test_startup_time() -> None:
     pytest.importorskip("torch")
     printed = run_script(SCRIPTS / "startup_time.py", str(ROOT), str(ROOT), "--runs", "1")

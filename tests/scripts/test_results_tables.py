@@ -24,7 +24,7 @@ def test_committed_tables_are_up_to_date(tmp_path: Path) -> None:
     fresh = {path.name: path.read_text() for path in output.iterdir()}
     committed = {path.name: path.read_text() for path in GENERATED.glob("*.md")}
     assert fresh == committed
-    assert "real_maps_ompl_2.0.1.md" in fresh
+    assert "real_maps.md" in fresh
     table = (GENERATED / "overview.md").read_text()
     assert f"<!-- results -->\n{table}<!-- end of results -->" in readme.read_text()
 
@@ -47,8 +47,8 @@ def test_auto_takes_what_is_there_sooner() -> None:
 
 def test_every_row_of_a_table_has_all_columns() -> None:
     for path in GENERATED.glob("*.md"):
-        columns = {line.count("|") for line in path.read_text().splitlines()}
-        assert len(columns) == 1, path.name
+        lines = [line for line in path.read_text().splitlines() if line.startswith("|")]
+        assert len({line.count("|") for line in lines}) == 1, path.name
 
 
 def test_summaries_of_other_benchmarks(tmp_path: Path) -> None:

@@ -136,3 +136,16 @@ def test_generated_maps(tmp_path: Path) -> None:
     assert scores["all"]["connected"] > 0.9
     assert scores["all"]["iou"] > 0.8
     assert scores["all"]["angles"]["median"] < 0.15
+
+
+@pytest.mark.slow
+def test_overlap(tmp_path: Path) -> None:
+    pytest.importorskip("torch")
+    rows, report = tmp_path / "rows.jsonl", tmp_path / "overlap.json"
+    words = ["bundled:rooms", "--tasks-per-map", "1", "--runs", "1", "--rows", str(rows)]
+    for _ in range(2):  # the second time every run is there already
+        run_script(STUDIES / "overlap.py", *words, "--json", str(report))
+        assert len(rows.read_text().splitlines()) == 2
+    summary = json.loads(report.read_text())["rows"]
+    assert [row["way"] for row in summary] == ["uniform", "waiting", "overlap"] * 2
+    assert [row["ratio"] for row in summary[::3]] == [[1, 1, 1]] * 2

@@ -1,0 +1,95 @@
+"""The speed of a prediction, by the size of the map and by what computes the network.
+
+    OMP_NUM_THREADS=1 python scripts/inference_speed.py --json inference_speed.json
+
+The models take turns on the same tasks, on random maps of each size. ``first`` is a prediction on a
+map that is new, with the labels of its parts and its scaled copy; ``next`` one for another task on
+it; ``of 64`` a task of 64 in one call; all with repair. Times are those of the processor (one
+thread, so that other work does not count), medians over the tasks, in milliseconds.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping
+from time import process_time
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from search_speed import GENERATORS
+
+from cbagan_ompl import GridMap, Predictor, load_model
+from cbagan_ompl.common.files import write_json
+from cbagan_ompl.common.markdown import table
+from cbagan_ompl.inference.bundled_models import bundled_model
+from cbagan_ompl.map_generators import MAP_GENERATORS
+
+COLUMNS = ("first", "next", "of 64")
+BATCH = 64
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--sizes", type=int, nargs="+", default=[256, 512, 1024, 2048, 4096])
+    parser.add_argument("--model", action="append", metavar="FILE", help="may be repeated")
+    parser.add_argument("--json", metavar="FILE", help="write the figures as JSON")
+    args = parser.parse_args()
+    default = bundled_model().with_suffix(".pt")
+    paths = args.model or [default, default.with_suffix(".onnx")]
+    models = {str(path).rpartition("/")[2]: load_model(path) for path in paths}
+    result: dict[str, Any] = {"sizes": {str(size): measure(models, size) for size in args.sizes}}
+    print(speed_table(result))
+    if args.json is not None:
+        write_json(args.json, result)
+
+
+def measure(models: Mapping[str, Predictor], size: int) -> dict[str, dict[str, float]]:
+    """Return the medians of all models on maps of a size."""
+    times: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
+    for free, tasks in random_tasks(size):
+        starts, goals = tasks[:, 0], tasks[:, 1]
+        for name, model in models.items():
+            grid = GridMap(free)
+            times[name]["first"].append(seconds(model.predict, grid, starts[0], goals[0]))
+            for start, goal in tasks[1:6]:
+                times[name]["next"].append(seconds(model.predict, grid, start, goal))
+            if size == min(model.record["working_size"], size):
+                duration = seconds(model.predict_many, grid, starts, goals)
+                times[name]["of 64"].append(duration / BATCH)
+    return {
+        name: {column: 1e3 * float(np.median(values)) for column, values in rows.items()}
+        for name, rows in times.items()
+    }
+
+
+def random_tasks(size: int) -> Iterator[tuple[NDArray[np.bool_], NDArray[np.float64]]]:
+    """Yield maps, and for each the tasks, (64, 2, 2), a third of the side apart at least."""
+    for seed, name in enumerate(GENERATORS):
+        rng = np.random.default_rng(seed)
+        free = MAP_GENERATORS[name](rng, size, size)
+        pixels = np.argwhere(free)[:, ::-1] + 0.5
+        pairs = rng.choice(pixels, (8 * BATCH, 2))
+        far = np.hypot(*(pairs[:, 1] - pairs[:, 0]).T) > size / 3
+        yield free, pairs[far][:BATCH]
+
+
+def seconds(function: Callable[..., object], *arguments: Any) -> float:
+    begin = process_time()
+    function(*arguments)
+    return process_time() - begin
+
+
+def speed_table(result: Mapping[str, Any]) -> str:
+    """Return the figures as a table of Markdown."""
+    rows = [
+        (f"{size} px", name, *(f"{row[c]:.2f}" if c in row else "" for c in COLUMNS))
+        for size, models in result["sizes"].items()
+        for name, row in models.items()
+    ]
+    return table(("map", "model", *COLUMNS), rows)
+
+
+if __name__ == "__main__":
+    main()
