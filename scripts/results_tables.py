@@ -56,8 +56,16 @@ def main() -> None:
         return
     make_folder(args.output)
     for name, make in {**TABLES, **suite_tables()}.items():
-        write_atomically(args.output / f"{name}.md", make() + "\n")
+        write_atomically(args.output / f"{name}.md", made(make) + "\n")
     args.readme.write_text(with_table(args.readme.read_text(encoding="utf-8")), encoding="utf-8")
+
+
+def made(make: Callable[[], str]) -> str:
+    """Return a table, or that it is not measured yet."""
+    try:
+        return make()
+    except FileNotFoundError as error:
+        return f"*Not measured with this version yet: `{Path(error.filename).name}`.*"
 
 
 def unseen_maps_connectivity() -> str:

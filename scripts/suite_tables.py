@@ -38,10 +38,22 @@ def versions_of(suite: str) -> list[str]:
     return [one for one in VERSIONS if (RESULTS / f"{suite}_ompl_{one}.json").exists()]
 
 
+def measured_versions(name: str) -> list[str]:
+    """Return the same, where there is at least one.
+
+    Raises:
+        FileNotFoundError: there is none.
+    """
+    versions = versions_of(name)
+    if not versions:
+        read(f"{name}_ompl_{VERSIONS[0]}.json")
+    return versions
+
+
 def suite_ratios(suite: str) -> str:
     return "\n\n".join(
         f"OMPL {version}:\n\n{ratios_table(read(f'{suite}_ompl_{version}.json'))}"
-        for version in versions_of(suite)
+        for version in measured_versions(suite)
     )
 
 
@@ -79,7 +91,7 @@ def conditions() -> str:
 
 def rrtconnect() -> str:
     rows = []
-    for version in VERSIONS:
+    for version in measured_versions("rrtconnect"):
         for length, by_condition in read(f"rrtconnect_ompl_{version}.json")["ranges"].items():
             for condition, samplers in by_condition.items():
                 for sampler, row in samplers.items():

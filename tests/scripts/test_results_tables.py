@@ -47,7 +47,10 @@ def test_auto_takes_what_is_there_sooner() -> None:
 
 def test_every_row_of_a_table_has_all_columns() -> None:
     for path in GENERATED.glob("*.md"):
-        lines = [line for line in path.read_text().splitlines() if line.startswith("|")]
+        text = path.read_text()
+        if text.startswith("*Not measured"):
+            continue
+        lines = [line for line in text.splitlines() if line.startswith("|")]
         assert len({line.count("|") for line in lines}) == 1, path.name
 
 
