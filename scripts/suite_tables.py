@@ -38,7 +38,14 @@ def versions_of(suite: str) -> list[str]:
     return [one for one in VERSIONS if (RESULTS / f"{suite}_ompl_{one}.json").exists()]
 
 
+def not_measured(name: str) -> str:
+    """Return what stands where a table would be, for results that have not been made yet."""
+    return f"*Not measured yet: `python benchmarks/run_all.py --only {name}`.*"
+
+
 def suite_ratios(suite: str) -> str:
+    if not versions_of(suite):
+        return not_measured(suite)
     return "\n\n".join(
         f"OMPL {version}:\n\n{ratios_table(read(f'{suite}_ompl_{version}.json'))}"
         for version in versions_of(suite)
@@ -46,6 +53,8 @@ def suite_ratios(suite: str) -> str:
 
 
 def suite_times(suite: str) -> str:
+    if VERSIONS[0] not in versions_of(suite):
+        return not_measured(suite)
     return times_table(read(f"{suite}_ompl_{VERSIONS[0]}.json"), ("uniform", "learned", "corridor"))
 
 
@@ -96,6 +105,8 @@ def rrtconnect() -> str:
 
 
 def overhead() -> str:
+    if not (RESULTS / "overhead.json").exists():
+        return not_measured("overhead")
     result = read("overhead.json")
     ratios = result["ratios"]
     cells = [f"{value:.3f}" for value in (result["median"], min(ratios), max(ratios))]
