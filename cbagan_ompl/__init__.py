@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from .planning.validity import GridMotionValidator, GridValidityChecker
     from .plotting import save_figure
     from .robots.robot import Robot
+    from .sampling.guarantee import Guarantee
     from .sampling.heatmap import Heatmap
     from .sampling.options import Adaptation, HeadingSpread, SamplerOptions
 
@@ -64,6 +65,7 @@ __all__ = [
     "GridMap",
     "GridMotionValidator",
     "GridValidityChecker",
+    "Guarantee",
     "HeadingSpread",
     "Heatmap",
     "HeatmapError",
@@ -116,6 +118,7 @@ _HOMES = {
     "planning.validity": ("GridMotionValidator", "GridValidityChecker"),
     "plotting": ("save_figure",),
     "robots.robot": ("Robot",),
+    "sampling.guarantee": ("Guarantee",),
     "sampling.heatmap": ("Heatmap",),
     "sampling.options": ("Adaptation", "HeadingSpread", "SamplerOptions"),
 }

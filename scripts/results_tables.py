@@ -161,7 +161,7 @@ def ablation() -> str:
 
 def generated_maps() -> str:
     models = read("generated_maps.json")["models"]
-    names = {"before": "version 1.0", "not learned": "not learned", "bundled": "bundled model"}
+    names = {"before": "version 0.2", "not learned": "not learned", "bundled": "bundled model"}
     header = ["kind of maps"]
     for name in names.values():
         header += [f"connected (8): {name}", "IoU"]

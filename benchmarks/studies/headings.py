@@ -1,14 +1,14 @@
-"""How should headings follow a heat map? Robots with a shape, with several ways to sample headings.
+"""How should samples follow the headings of a heat map? Robots with a shape on generated maps.
 
-    python benchmarks/studies/headings.py --json benchmarks/results/headings.json
-    python benchmarks/studies/headings.py --maps DIR/*.png --tasks DIR/tasks.csv --json FILE
+    python benchmarks/studies/headings.py --rows headings.jsonl --json headings.json \
+        --plot docs/images/headings.png
 
-Without ``--maps`` the maps are generated, and the ways to sample are those of a curve: spread,
-uniform fraction, reversals, direction to the goal against direction along a path. With it they are
-few: OMPL's own sampler, the positions of the learned heat map alone, and its headings as well.
-Times are seconds of one thread's CPU until the first path, inference and headings included, and
-until a path within 10 % of the shortest that any run has found. Each run is a line of ``--rows`` as
-soon as it has ended; a run that is there already is not done again.
+One option at a time is changed: the spread, the uniform fraction, the fraction before the goal, the
+reversals, how far the map is inflated that the network sees, and whether the heading is that of the
+cheapest way to the goal or that of the nearest pixel of one path. The robot is a rectangle of
+12 x 6 pixels. Times are seconds of one thread's CPU until the first path, heat map and headings
+included; a run without a path in time counts as twice the limit in the geometric mean. Each run is
+a line of ``--rows`` as soon as it has ended; a run that is there already is not done again.
 """
 
 from __future__ import annotations
@@ -16,214 +16,129 @@ from __future__ import annotations
 import argparse
 import json
 from collections import defaultdict
-from collections.abc import Iterator
-from dataclasses import dataclass
-from math import atan2, inf, pi
+from dataclasses import asdict, replace
+from math import inf
 from pathlib import Path
-from time import thread_time
+from time import process_time
 from typing import Any
 
+import cv2
 import numpy as np
-from ompl import base as ob
-from ompl import geometric as og
-from ompl import util as ou
-
-from cbagan_ompl import (
-    GridMap,
-    HeadingSpread,
-    Heatmap,
-    MapError,
-    Predictor,
-    Robot,
-    RobotMotionValidator,
-    RobotValidityChecker,
-    attach,
-    load_model,
-    tasks_of,
+from pose_runs import (
+    LENGTH,
+    SPACES,
+    WIDTH,
+    PoseTask,
+    generated_tasks,
+    make_setup,
+    solve,
 )
+
+from cbagan_ompl import HeadingSpread, Heatmap, Predictor, Robot, TaskError, attach, load_model
 from cbagan_ompl.common.files import write_json
-from cbagan_ompl.map_generators import MAP_GENERATORS
 from cbagan_ompl.maps.grid_search import shortest_path
-from cbagan_ompl.maps.tasks import load_tasks
 from cbagan_ompl.planning import compat
-from cbagan_ompl.robots.shape_checker import ShapeChecker
+from cbagan_ompl.planning.compat import ou
 
-LENGTH, WIDTH, RANGE, TOLERANCE, WITHIN = 12.0, 6.0, 30.0, 1.0, 1.1
-SPACES = {
-    "SE2": {},
-    "Dubins 10": {"turning_radius": 10.0},
-    "Dubins 5": {"turning_radius": 5.0},
-    "Reeds-Shepp 10": {"turning_radius": 10.0, "reverse": True},
+OWN, DEFAULT, ALONG, INFLATED = "OMPL's own", "default", "along the path", "inflated by"
+CURVES = {
+    "spread": (0.1, 0.2, 0.8, 1.6),
+    "uniform_fraction": (0.05, 0.4, 0.7, 1.0),
+    "approach_fraction": (0.0, 0.05, 0.2, 0.4),
+    "reverse_fraction": (0.0, 0.1, 0.35, 0.5),
 }
-# Maps on which the way is not straight, generated at half their size and enlarged for the robot.
-GENERATORS = (
-    "bug_trap",
-    "caves",
-    "cell_maze",
-    "curved_walls",
-    "halls",
-    "maze",
-    "narrow_passage",
-    "offices",
-    "shelves",
-    "walls_with_gaps",
-    "warehouse",
-)
-SIDE, WIDE, SHORTEST, DETOUR = 256, 4.0, 300.0, 1.5
-POSITIONS_ONLY = HeadingSpread(uniform_fraction=1)
-WAYS: dict[str, HeadingSpread | None] = {
-    "OMPL's own": None,
-    "positions only": POSITIONS_ONLY,
-    "default": HeadingSpread(),
+INFLATIONS = (1.6, 4.5, 6.0)
+# A robot that turns on the spot needs no approach, and only one space has reversals.
+UNUSED = {
+    "SE2": {"approach_fraction", "reverse_fraction"},
+    "Dubins 10": {"reverse_fraction"},
+    "Reeds-Shepp 10": set[str](),
 }
-CURVE = WAYS | {
-    **{f"spread {s:g}": HeadingSpread(spread=s) for s in (0.15, 0.25, 0.6, 0.9)},
-    **{f"uniform {u:g}": HeadingSpread(uniform_fraction=u) for u in (0.05, 0.1, 0.4)},
-    "along the path": HeadingSpread(),
-}
-REVERSALS = {f"reversed {r:g}": HeadingSpread(reverse_fraction=r) for r in (0.0, 0.1, 0.35, 0.5)}
-
-
-@dataclass
-class PoseTask:
-    """A map, and poses (x, y, yaw) to plan between."""
-
-    name: str
-    grid: GridMap
-    start: tuple[float, float, float]
-    goal: tuple[float, float, float]
-    length: float
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--maps", nargs="+", metavar="MAP", help="files, or bundled:NAME")
-    parser.add_argument("--tasks", metavar="FILE", help="tasks on the maps (CSV)")
-    parser.add_argument("--tasks-per-map", type=int, default=3)
-    parser.add_argument("--count", type=int, default=24, help="tasks on generated maps")
-    parser.add_argument("--spaces", default=",".join(SPACES))
-    parser.add_argument("--planners", default="RRT,RRTstar")
-    parser.add_argument("--seeds", type=int, default=1)
-    parser.add_argument("--time", type=float, default=2.0, help="CPU seconds of a run")
-    parser.add_argument("--first", action="store_true", help="end runs with their first path")
+    parser.add_argument("--count", type=int, default=20, help="tasks")
+    parser.add_argument("--planners", default="RRTstar,RRT")
+    parser.add_argument("--time", type=float, default=0.7, help="CPU seconds of a run")
     parser.add_argument("--rows", metavar="FILE", default="headings.jsonl")
     parser.add_argument("--json", metavar="FILE")
+    parser.add_argument("--plot", metavar="FILE")
     args = parser.parse_args()
     ou.setLogLevel(ou.LOG_NONE)
-    tasks = list(file_tasks(args)) if args.maps else list(generated_tasks(args.count))
     predictor = load_model()
     rows = Path(args.rows)
     done = [json.loads(line) for line in rows.read_text().splitlines()] if rows.exists() else []
     known = {tuple(row["key"]) for row in done}
-    for seed in range(args.seeds):
-        for task in tasks:
-            for key, robot, way in runs(args, task, seed):
-                if key not in known:
-                    result = measure(task, robot, key, way, predictor, args)
-                    done.append({"key": key, **result})
-                    with rows.open("a") as file:
-                        file.write(json.dumps(done[-1]) + "\n")
-    summary = summarise(done)
-    for line in summary:
-        print(line)
+    tasks = list(generated_tasks(args.count))
+    for planner in args.planners.split(","):
+        for number, task in enumerate(tasks):
+            for space in UNUSED:
+                for way in ways_of(space):
+                    key = space, planner, way, number
+                    if key not in known:
+                        done.append({"key": key, **measure(task, key, predictor, args.time)})
+                        with rows.open("a") as file:
+                            file.write(json.dumps(done[-1]) + "\n")
+    summary = summarise(done, args.time)
+    for row in summary:
+        print(row)
+    defaults = asdict(HeadingSpread())
+    head = {"ompl": compat.ompl_version(), "time": args.time, "tasks": args.count}
     if args.json is not None:
-        write_json(args.json, {"ompl": compat.ompl_version(), "time": args.time, "rows": summary})
+        write_json(args.json, head | {"defaults": defaults, "rows": summary})
+    if args.plot is not None:
+        plot(summary, defaults, args.plot)
 
 
-def runs(
-    args: argparse.Namespace, task: PoseTask, seed: int
-) -> Iterator[tuple[tuple[Any, ...], Robot, HeadingSpread | None]]:
-    """Yield the key, the robot and the way to sample of each run of a task."""
-    for space in args.spaces.split(","):
-        robot = Robot.rectangle(LENGTH, WIDTH, **SPACES[space])
-        ways = WAYS if args.maps else CURVE | (REVERSALS if robot.reverse else {})
-        for planner in args.planners.split(","):
-            for name, way in ways.items():
-                yield (space, planner, name, task.name, seed), robot, way
+def ways_of(space: str) -> list[str]:
+    """Return the ways to sample, by name."""
+    curves = [(name, value) for name in CURVES.keys() - UNUSED[space] for value in CURVES[name]]
+    changed = [f"{name} {value:g}" for name, value in sorted(curves)]
+    inflated = [f"{INFLATED} {radius:g}" for radius in INFLATIONS]
+    return [OWN, DEFAULT, ALONG, *inflated, *changed]
 
 
 def measure(
-    task: PoseTask,
-    robot: Robot,
-    key: tuple[Any, ...],
-    way: HeadingSpread | None,
-    predictor: Predictor,
-    args: argparse.Namespace,
+    task: PoseTask, key: tuple[str, str, str, int], predictor: Predictor, limit: float
 ) -> dict[str, Any]:
-    """Return the times of a run and the costs of its paths."""
-    _, planner, name, _, seed = key
-    compat.seed_ompl(seed)
+    """Return the time until the first path; None without one."""
+    space, planner, way, number = key
+    robot = Robot.rectangle(LENGTH, WIDTH, **SPACES[space])
+    compat.seed_ompl(number + 1)
     setup = make_setup(task, robot, planner)
-    attachment, inference = None, 0.0
-    if way is not None:
-        inflated = task.grid.inflated(robot.inscribed_radius)
-        began = thread_time()
-        heatmap = predictor.predict(inflated, task.start[:2], task.goal[:2])
-        if name == "along the path":
-            heatmap = directed_along(heatmap, task)
-        attachment = attach(setup, heatmap, seed=seed, heading=way)
-        inference = thread_time() - began
-    costs = solve(setup, args.time, args.first)
-    if attachment is not None:
-        attachment.detach()
-    return {"inference": inference, "costs": costs}
+    if way == OWN:
+        return {"first": first(solve(setup, limit, True), 0.0)}
+    began = process_time()
+    heatmap = make_heatmap(task, robot, way, predictor)
+    with attach(setup, heatmap, seed=number, heading=spread_of(way)):
+        inference = process_time() - began
+        costs = solve(setup, limit, True)
+    return {"first": first(costs, inference)}
 
 
-def make_setup(task: PoseTask, robot: Robot, planner: str) -> Any:
-    kind = getattr(ob, robot.state_space)
-    space = kind() if robot.turning_radius is None else kind(robot.turning_radius)
-    bounds = ob.RealVectorBounds(2)
-    for axis, (low, high) in enumerate(zip(*task.grid.bounds, strict=True)):
-        bounds.setLow(axis, float(low))
-        bounds.setHigh(axis, float(high))
-    space.setBounds(bounds)
-    setup = og.SimpleSetup(space)
-    si = setup.getSpaceInformation()
-    setup.setStateValidityChecker(RobotValidityChecker(si, task.grid, robot))
-    si.setMotionValidator(RobotMotionValidator(si, task.grid, robot))
-    start, goal = (make_state(space, pose) for pose in (task.start, task.goal))
-    setup.setStartAndGoalStates(start, goal, TOLERANCE)
-    instance = getattr(og, planner)(si)
-    instance.setRange(RANGE)
-    setup.setPlanner(instance)
-    return setup
+def first(costs: list[tuple[float, float]], inference: float) -> float | None:
+    return inference + costs[0][0] if costs else None
 
 
-def make_state(space: Any, pose: tuple[float, float, float]) -> Any:
-    state = compat.new_state(space)
-    typed = compat.typed_state(state)
-    typed.setX(pose[0])
-    typed.setY(pose[1])
-    typed.setYaw(pose[2])
-    return state
+def spread_of(way: str) -> HeadingSpread:
+    name, _, value = way.partition(" ")
+    return replace(HeadingSpread(), **{name: float(value)}) if name in CURVES else HeadingSpread()
 
 
-def solve(setup: Any, limit: float, first: bool) -> list[tuple[float, float]]:
-    """Return (CPU seconds, cost) of each better path."""
-    planner = setup.getPlanner()
-    goes_on = hasattr(planner, "bestCost")
-    costs: list[tuple[float, float]] = []
-    best = inf
-    began = thread_time()
-
-    def stop() -> bool:
-        nonlocal best
-        elapsed = thread_time() - began
-        if goes_on and (cost := compat.best_cost(planner)) < best:
-            best = cost
-            costs.append((elapsed, best))
-        return elapsed >= limit or (first and best < inf)
-
-    is_exact = compat.is_exact(setup.solve(compat.termination_condition(stop)))
-    if not goes_on and is_exact:
-        costs.append((thread_time() - began, setup.getSolutionPath().length()))
-    return costs if is_exact else []
+def make_heatmap(task: PoseTask, robot: Robot, way: str, predictor: Predictor) -> Heatmap:
+    if way.startswith(INFLATED):
+        inflated = task.grid.inflated(float(way.removeprefix(INFLATED)))
+        try:
+            return predictor.predict(inflated, task.start[:2], task.goal[:2])
+        except TaskError:  # nothing connects start and goal there
+            pass
+    heatmap = predictor.predict(task.grid, task.start, task.goal, robot=robot)
+    return directed_along(heatmap, task) if way == ALONG else heatmap
 
 
 def directed_along(heatmap: Heatmap, task: PoseTask) -> Heatmap:
     """Return the heat map with the direction of the nearest pixel of the cheapest path over it."""
-    import cv2
-
     grid = heatmap.grid
     ends = [tuple(map(int, grid.to_pixel(pose[:2]))) for pose in (task.start, task.goal)]
     path = shortest_path(grid.free, *ends, 1 / (heatmap.values + np.float32(0.02)))
@@ -240,110 +155,59 @@ def directed_along(heatmap: Heatmap, task: PoseTask) -> Heatmap:
     return heatmap.with_heading(by_label[labels])
 
 
-def generated_tasks(count: int) -> Iterator[PoseTask]:
-    """Yield tasks whose shortest way for a wide disc is long and has a detour."""
-    rng = np.random.default_rng(20)
-    number = found = 0
-    while found < count:
-        name = GENERATORS[number % len(GENERATORS)]
-        half = MAP_GENERATORS[name](rng, SIDE // 2, SIDE // 2)
-        grid = GridMap(np.kron(half, np.ones((2, 2), bool)), name=f"{name}-{number}")
-        number += 1
-        try:
-            wide = grid.inflated(WIDE)
-        except MapError:  # nothing is left
-            continue
-        pixels = np.argwhere(wide.free)[:, ::-1]
-        for _ in range(40):
-            start, goal = pixels[rng.integers(len(pixels), size=2)] + 0.5
-            if np.hypot(*(goal - start)) < 80:
-                continue
-            if wide.components[tuple(start.astype(int)[::-1])] == wide.components[
-                tuple(goal.astype(int)[::-1])
-            ] and (task := pose_task(grid.name, grid, wide, start, goal, SHORTEST)):
-                found += 1
-                yield task
-                break
-
-
-def file_tasks(args: argparse.Namespace) -> Iterator[PoseTask]:
-    """Yield the few tasks on each map that are the longest for the robot."""
-    for word in args.maps:
-        grid = GridMap.load(word)
-        inflated = grid.inflated(WIDTH / 2)
-        tasks = load_tasks(args.tasks, grid) if args.tasks else tasks_of(word, grid)
-        poses = [
-            pose_task(f"{grid.name}-{number}", grid, inflated, task.start, task.goal, 0.0)
-            for number, task in enumerate(tasks)
-        ]
-        fitting = [task for task in poses if task is not None]
-        yield from sorted(fitting, key=lambda task: -task.length)[: args.tasks_per_map]
-
-
-def pose_task(
-    name: str, grid: GridMap, wide: GridMap, start: Any, goal: Any, shortest: float
-) -> PoseTask | None:
-    """Return a task with the yaws of the shortest path at its ends; None if the robot collides."""
-    ends = [tuple(map(int, grid.to_pixel(point))) for point in (start, goal)]
-    fits = wide.is_free(np.array((start, goal))).all()
-    path = shortest_path(wide.free, *ends) if fits else None
-    if path is None:
-        return None
-    length = float(np.hypot(*np.diff(path, axis=0).T).sum())
-    if shortest and length < max(shortest, DETOUR * np.hypot(*(path[-1] - path[0]))):
-        return None
-    reach = min(12, len(path) - 1)
-    checker = ShapeChecker.of(grid, Robot.rectangle(LENGTH, WIDTH))
-    poses = []
-    for point, (du, dv) in ((start, path[reach] - path[0]), (goal, path[-1] - path[-1 - reach])):
-        # Where the robot does not fit that way round, the nearest heading in which it does.
-        turns = [0.0, *(s * k * pi / 12 for k in range(1, 6) for s in (1, -1))]
-        x, y, yaw = float(point[0]), float(point[1]), atan2(dv, du)
-        free = [yaw + turn for turn in turns if checker.pose_is_free(x, y, yaw + turn)]
-        if not free:
-            return None
-        # A yaw of pi is out of OMPL's bounds.
-        poses.append((x, y, (free[0] + pi) % (2 * pi) - pi))
-    return PoseTask(name, grid, *poses, length)
-
-
-def summarise(done: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return success, quartiles of the times in ms and ratios, by space, planner and sampler."""
-    best: dict[tuple[str, ...], float] = defaultdict(lambda: inf)
-    groups = defaultdict(list)
+def summarise(done: list[dict[str, Any]], limit: float) -> list[dict[str, Any]]:
+    """Return success, quartiles of the times and their geometric mean, by space and planner."""
+    groups: dict[tuple[str, str, str], list[float]] = defaultdict(list)
     for row in done:
-        space, planner, way, task, _ = row["key"]
-        groups[space, planner, way].append(row)
-        for _, cost in row["costs"]:
-            best[space, task] = min(best[space, task], cost)
+        space, planner, way, _ = row["key"]
+        groups[space, planner, way].append(inf if row["first"] is None else row["first"])
     summary = []
-    for (space, planner, way), rows in groups.items():
-        first, within = [], []
-        for row in rows:
-            good = WITHIN * best[space, row["key"][3]]
-            times = [row["inference"] + time for time, cost in row["costs"]]
-            costs = [cost for _, cost in row["costs"]]
-            first.append(times[0] if times else inf)
-            within.append(next((t for t, c in zip(times, costs, strict=True) if c <= good), inf))
+    for (space, planner, way), times in groups.items():
+        quartiles = np.percentile(times, (25, 50, 75), method="nearest")
+        logs = np.log(np.minimum(times, 2 * limit))
+        error = float(logs.std() / np.sqrt(len(logs)))
         summary.append(
-            {
-                "space": space,
-                "planner": planner,
-                "sampler": way,
-                "runs": len(rows),
-                "solved": round(float(np.isfinite(first).mean()), 3),
-                "first_ms": quartiles(first),
-                "within_ms": quartiles(within),
-                "inference_ms": quartiles([row["inference"] for row in rows])[1],
-            }
+            {"space": space, "planner": planner, "way": way, "runs": len(times)}
+            | {"solved": round(float(np.isfinite(times).mean()), 3)}
+            | {"first_ms": [round(1e3 * float(q), 1) if q < inf else None for q in quartiles]}
+            | {"mean_ms": round(1e3 * float(np.exp(logs.mean())), 1)}
+            | {"mean_error": round(error, 2)}
         )
     return summary
 
 
-def quartiles(times: list[float]) -> list[float | None]:
-    """Return the quartiles in ms; None where a run without a path is in the way."""
-    values = np.percentile(times, (25, 50, 75), method="nearest")
-    return [round(1e3 * float(value), 1) if np.isfinite(value) else None for value in values]
+def plot(summary: list[dict[str, Any]], defaults: dict[str, float], path: str) -> None:
+    """Draw the geometric mean of the time against each option."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11, 3.2), layout="constrained")
+    for axes, name in zip(figure.subplots(1, len(CURVES), sharey=True), CURVES, strict=True):
+        for space, unused in UNUSED.items():
+            if name in unused:
+                continue
+            for planner, style in (("RRTstar", "-"), ("RRT", "--")):
+                means = {
+                    row["way"]: (row["mean_ms"], row["mean_error"])
+                    for row in summary
+                    if (row["space"], row["planner"]) == (space, planner)
+                }
+                if not means:
+                    continue
+                points = {value: means[f"{name} {value:g}"] for value in CURVES[name]}
+                points[defaults[name]] = means[DEFAULT]
+                xs = sorted(points)
+                ys = np.array([points[x][0] for x in xs])
+                errors = np.array([points[x][1] for x in xs])
+                color = f"C{list(UNUSED).index(space)}"
+                axes.plot(xs, ys, style, color=color, marker="o", ms=3, label=f"{space} {planner}")
+                axes.fill_between(
+                    xs, ys * np.exp(-errors), ys * np.exp(errors), color=color, alpha=0.08
+                )
+        axes.axvline(defaults[name], color="0.7", lw=0.8, zorder=0)
+        axes.set(xlabel=name, yscale="log")
+    figure.axes[0].set_ylabel("first path, ms (geometric mean)")
+    figure.axes[-1].legend(fontsize=6)
+    figure.savefig(path, dpi=110)
 
 
 if __name__ == "__main__":

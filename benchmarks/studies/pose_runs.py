@@ -59,7 +59,14 @@ class PoseTask:
     detour: float
 
 
-def make_setup(task: PoseTask, robot: Robot, planner: str) -> Any:
+def make_setup(
+    task: PoseTask,
+    robot: Robot,
+    planner: str,
+    range: float | None = RANGE,
+    tolerance: float = TOLERANCE,
+) -> Any:
+    """Return a SimpleSetup with exact checks; its planner has OMPL's own range for None."""
     kind = getattr(ob, robot.state_space)
     space = kind() if robot.turning_radius is None else kind(robot.turning_radius)
     bounds = ob.RealVectorBounds(2)
@@ -72,9 +79,10 @@ def make_setup(task: PoseTask, robot: Robot, planner: str) -> Any:
     setup.setStateValidityChecker(RobotValidityChecker(si, task.grid, robot))
     si.setMotionValidator(RobotMotionValidator(si, task.grid, robot))
     start, goal = (make_state(space, pose) for pose in (task.start, task.goal))
-    setup.setStartAndGoalStates(start, goal, TOLERANCE)
+    setup.setStartAndGoalStates(start, goal, tolerance)
     instance = getattr(og, planner)(si)
-    instance.setRange(RANGE)
+    if range is not None:
+        instance.setRange(range)
     setup.setPlanner(instance)
     return setup
 

@@ -7,6 +7,7 @@ Speed: the mean CPU time of RobotMotionValidator in SE(2) for a 12 x 6 pixel rec
 multiple of GridMotionValidator's for a point on the same motions, interleaved. Tables: CPU time and
 memory for all headings of a map of 1024 x 1024 pixels. Paths: planners solve random tasks on small
 random maps, and every path is looked at each tenth of a pixel with shapely, polygon against pixels.
+Poses: random ones on such maps; what the checker refuses of those that shapely allows.
 """
 
 from __future__ import annotations
@@ -160,6 +161,21 @@ def solve(
     return motions
 
 
+def check_poses(count: int, rng: np.random.Generator) -> dict[str, int]:
+    """Return how many poses the dense test allows, and how many of them the checker refuses."""
+    result = {"allowed": 0, "refused": 0, "wrongly_allowed": 0}
+    for robot in itertools.islice(itertools.cycle(ROBOTS.values()), count // 100):
+        grid = random_map(rng)
+        checker = ShapeChecker.of(grid, robot)
+        poses = np.array([random_pose(grid, rng) for _ in range(100)])
+        is_free = np.array([checker.pose_is_free(*pose) for pose in poses.tolist()])
+        collides = DenseCheck(grid, robot).collides(poses)
+        result["allowed"] += int((~collides).sum())
+        result["refused"] += int((~collides & ~is_free).sum())
+        result["wrongly_allowed"] += int((collides & is_free).sum())
+    return result
+
+
 def check_paths(paths: int, rng: np.random.Generator) -> dict[str, int]:
     result = {"solved": 0, "colliding": 0, "unsolved": 0, "poses": 0}
     kinds = itertools.cycle(itertools.product(SPACES, ROBOTS, PLANNERS))
@@ -206,6 +222,8 @@ def main() -> None:
     result["tables"] = measure_tables(1024)
     print("tables:", {key: round(value, 3) for key, value in result["tables"].items()})
     if args.paths:
+        result["poses"] = check_poses(10 * args.paths, rng)
+        print("poses:", result["poses"])
         result["paths"] = check_paths(args.paths, rng)
         print("paths:", result["paths"])
     if args.json:

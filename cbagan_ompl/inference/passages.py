@@ -26,9 +26,10 @@ class PassagesPipeline:
     def __init__(self, graphs: Graphs) -> None:
         # Here, since numba takes long to import.
         from ..networks import fast_marching, full_nodes
+        from ..networks.lowered_pixels import lowered_pixels
 
         self.graphs = graphs
-        self._marching, self._nodes = fast_marching, full_nodes
+        self._marching, self._nodes, self._lower = fast_marching, full_nodes, lowered_pixels
 
     def read_maps(self, free: NDArray[np.bool_], full: NDArray[np.bool_] | None = None) -> KeptMaps:
         """Return what depends on the maps alone.
@@ -64,12 +65,16 @@ class PassagesPipeline:
             for points in (start, goal)
         ]
         # The distances come first: they need the costs of a task alone, not its features.
-        batch = [np.repeat(array, tasks // len(array), axis=0) for array in maps.arrays[:5]]
+        batch = [
+            array if len(array) == tasks else np.repeat(array, tasks // len(array), axis=0)
+            for array in maps.arrays[:5]
+        ]
         features, costs, codes, linked, padded = batch
         distances = self._marching.march_all(costs, linked, *endpoints)
         towards = self._marching.descent_directions(distances, linked)
+        lowered = self._lower(costs, codes, distances)
         region, vectors = self.graphs.call(
-            "paint", [features, costs], codes, distances, towards, padded
+            "paint", [features, costs], lowered, distances, towards, padded
         )
         height, width = maps.shape
         values = region[:, 0, :height, :width]

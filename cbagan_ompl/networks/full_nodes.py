@@ -11,6 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.compilation import compiled
+from .fast_marching import link_bits
+
+# The nodes of each code of a patch of 4 x 4 pixels, found when they are first needed.
+_NODES_OF, _IS_KNOWN = np.zeros((2**16, 4), np.int32), np.zeros(2**16, np.bool_)
 
 
 def full_nodes(
@@ -33,6 +37,10 @@ def full_nodes(
         >>> codes[:, 0, 0].tolist(), linked[0].tolist()
         ([65535, 0, 0, 0], [[4112, 4097], [272, 257]])
     """
+    if shape == free.shape:
+        codes = np.zeros((4, *patches), np.int32)
+        _read_patches(free, codes, _NODES_OF, _IS_KNOWN)
+        return codes, link_bits(codes[None])[0]
     edges = [
         np.append(np.arange(n) * size // n, size) for n, size in zip(shape, free.shape, strict=True)
     ]
@@ -76,6 +84,42 @@ def full_node_of(
     _label(np.ascontiguousarray(block), heights, widths, nodes, own)
     node = max(0, int(nodes[pixel[1] - top, pixel[0] - left]) - 1)
     return int((node * codes.shape[1] + row) * codes.shape[2] + column)
+
+
+@compiled
+def _read_patches(
+    free: NDArray[np.bool_],
+    codes: NDArray[np.int32],
+    nodes_of: NDArray[np.int32],
+    is_known: NDArray[np.bool_],
+) -> None:  # pragma: no cover
+    """Find the codes of the nodes of a map that is not scaled, in place.
+
+    Args:
+        free: (H, W), true where free.
+        codes: (4, h, w), zeros.
+        nodes_of: (65536, 4), the nodes of each code, as far as they are known; more are added.
+        is_known: (65536,), of which codes they are.
+    """
+    height, width = free.shape
+    block, nodes = np.zeros((4, 4), np.bool_), np.zeros((4, 4), np.uint8)
+    labels, stack = np.empty(16, np.int32), np.empty(16, np.int64)
+    for row in range(0, height, 4):
+        for column in range(0, width, 4):
+            code = 0
+            for i in range(min(4, height - row)):
+                for j in range(min(4, width - column)):
+                    code |= free[row + i, column + j] << (4 * i + j)
+            if not is_known[code]:
+                for bit in range(16):
+                    block[bit // 4, bit % 4] = (code >> bit) & 1
+                _label_patch(block, labels, stack, nodes)
+                for bit in range(16):
+                    if nodes[bit // 4, bit % 4]:
+                        nodes_of[code, nodes[bit // 4, bit % 4] - 1] |= 1 << bit
+                is_known[code] = True
+            for node in range(4):
+                codes[node, row // 4, column // 4] = nodes_of[code, node]
 
 
 @compiled

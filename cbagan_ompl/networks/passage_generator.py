@@ -166,11 +166,29 @@ class PassageGenerator(nn.Module):
         Returns:
             (B, 1, H, W) in [0, 1], and (B, 2, h, w) as of :meth:`forward`.
         """
-        # Both distances count the cost of the node itself.
-        through = distances.sum(1) - costs
-        best = through.amin((1, 2, 3), keepdim=True)
-        unit = 0.05 * (best + 1.0) + 0.25
-        excess = ((through - best) / unit).clamp(0.0, 12.0)
+        lowered = lowered_pixels(costs, codes, distances)
+        return self.paint_pixels(features, costs, lowered, distances, towards, free)
+
+    def paint_pixels(
+        self,
+        features: Tensor,
+        costs: Tensor,
+        lowered: Tensor,
+        distances: Tensor,
+        towards: Tensor,
+        free: Tensor,
+    ) -> tuple[Tensor, Tensor]:
+        """Return region and directions; arguments and result as of :meth:`paint`.
+
+        Args:
+            features: as there.
+            costs: as there.
+            lowered: from :func:`lowered_pixels`.
+            distances: as there.
+            towards: as there.
+            free: as there.
+        """
+        excess, best, unit = _excess(costs, distances)
         least, node = excess.min(1, keepdim=True)
         size = [-1, 4, -1, -1, -1]
         towards = towards.flatten(1, 2).gather(2, node.unsqueeze(1).expand(size)).squeeze(2)
@@ -178,8 +196,7 @@ class PassageGenerator(nn.Module):
         cost = costs.gather(1, node)
         slope = (towards[:, :2] + to_goal) * (-cost / unit)
         known = distances[:, 0].gather(1, node)
-        logits = _label_logit(excess)
-        own = logits.gather(1, node)
+        own = _label_logit(least)
         inputs = torch.cat(
             (
                 features,
@@ -198,10 +215,7 @@ class PassageGenerator(nn.Module):
         painted = self.head(self.fuse(inputs).permute(0, 2, 3, 1)).float()
         within = torch.matmul(slope.permute(0, 2, 3, 1), self.offsets)
         pixels = least.permute(0, 2, 3, 1) + within
-        tiles = painted[..., :16] + self.gain * _label_logit(pixels)
-        # What the other nodes of a patch are worse.
-        worse = (logits - own) * (codes > 0)
-        tiles = _lower_worse_pixels(tiles, worse, codes)
+        tiles = painted[..., :16] + self.gain * _label_logit(pixels) + lowered
         batch, height, width = tiles.size(0), tiles.size(1), tiles.size(2)
         tiles = torch.sigmoid(tiles).view(batch, height, width, 4, 4).transpose(2, 3)
         region = tiles.reshape(free.size())
@@ -210,26 +224,41 @@ class PassageGenerator(nn.Module):
         return (region * free if self.white_obstacles else region), vectors
 
 
-# With its branch also where a model is traced, for ONNX.
-@torch.jit.script_if_tracing  # type: ignore[untyped-decorator]
-def _lower_worse_pixels(logits: Tensor, worse: Tensor, codes: Tensor) -> Tensor:
-    """Return logits, lowered by how much the node of a pixel is below the best of its patch.
+def lowered_pixels(costs: Tensor, codes: Tensor, distances: Tensor) -> Tensor:
+    """Return by how much the node of each pixel is worse than the best one of its patch.
+
+    Programs call the compiled one in :mod:`.lowered_pixels`.
 
     Args:
-        logits: of the pixels, (B, h, w, 16).
-        worse: (B, 4, h, w), by how much nodes are below the best one, from -20 to 0.
-        codes: (B, 4, h, w).
+        costs: (B, 4, h, w), see :mod:`.passages`.
+        codes: the same.
+        distances: (B, 2, 4, h, w), the same.
 
     Returns:
-        (B, h, w, 16); pixels of several nodes have the best of these, others are as they are.
+        (B, h, w, 16), at most 0, as logits; of the best one where a pixel belongs to several nodes.
     """
+    logits = _label_logit(_excess(costs, distances)[0])
+    worse = (logits - logits.amax(1, keepdim=True)) * (codes > 0)
     if not bool((worse < 0).any()):
-        return logits
-    # The bits of a code, by arithmetic that ONNX has.
-    powers = torch.pow(2.0, torch.arange(16, device=codes.device).float())
-    members = torch.fmod(torch.floor(codes.float().unsqueeze(4) / powers), 2.0)
+        return torch.zeros_like(worse[:, :1]).permute(0, 2, 3, 1).expand(-1, -1, -1, 16)
+    bits = torch.arange(16, dtype=torch.int32, device=codes.device)
+    members = ((codes.unsqueeze(4) >> bits) & 1).float()
     best = (members * (worse + 20.0).unsqueeze(4)).amax(1)
-    return logits + torch.where(best > 0, best - 20.0, best)
+    return torch.where(best > 0, best - 20.0, best)
+
+
+def _excess(costs: Tensor, distances: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Return how much longer the best path through each node is than the best of all.
+
+    Returns:
+        (B, 4, h, w), in units in which the label falls to one half; the best distance, and the
+        unit, both (B, 1, 1, 1).
+    """
+    # Both distances count the cost of the node itself.
+    through = distances.sum(1) - costs
+    best = through.amin((1, 2, 3), keepdim=True)
+    unit = 0.05 * (best + 1.0) + 0.25
+    return ((through - best) / unit).clamp(0.0, 12.0), best, unit
 
 
 @torch.jit.unused

@@ -16,7 +16,7 @@ class PassageModel(nn.Module):
 
     What :meth:`read_map` returns depends on the map alone. Between it and :meth:`paint` come the
     nodes and the distances, which have no weights: a program computes them by compiled code
-    (:mod:`.full_nodes`, :mod:`.fast_marching`).
+    (:mod:`.full_nodes`, :mod:`.fast_marching`, :mod:`.lowered_pixels`).
 
     Args:
         generator: with its trained weights, in evaluation mode.
@@ -61,7 +61,7 @@ class PassageModel(nn.Module):
     def paint(
         self,
         kept: list[Tensor],
-        codes: Tensor,
+        lowered: Tensor,
         distances: Tensor,
         towards: Tensor,
         free: Tensor,
@@ -70,7 +70,7 @@ class PassageModel(nn.Module):
 
         Args:
             kept: from :meth:`read_map`.
-            codes: (B, 4, h, w) int32, see :func:`.passages.patch_codes`.
+            lowered: (B, h, w, 16), see :func:`.passage_generator.lowered_pixels`.
             distances: (B, 2, 4, h, w), see :func:`.passages.distance_fields`.
             towards: (B, 2, 2, 4, h, w), see :func:`.passages.directions`.
             free: (B, 1, 4 h, 4 w), 1 where free: the map with its padding.
@@ -80,8 +80,8 @@ class PassageModel(nn.Module):
             patch; 0 where no path leads.
         """
         features, costs = kept[0], kept[1]
-        region, vectors = self.generator.paint(features, costs, codes, distances, towards, free)
-        return [region, vectors]
+        painted = self.generator.paint_pixels(features, costs, lowered, distances, towards, free)
+        return [painted[0], painted[1]]
 
 
 def _make_merge(generator: PassageGenerator) -> nn.Conv2d:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor, wait
-from threading import Lock
+from concurrent.futures import Future
+from threading import Lock, Thread
 from time import perf_counter
 
 from ..sampling.heatmap import Heatmap
@@ -62,22 +62,29 @@ class Prediction:
         future: of the heat map.
 
     Args:
-        make: makes it; called in a thread of its own, which ends with it.
+        make: makes it; called in a thread of its own, which :meth:`start` begins and which ends
+            with it.
 
     Example:
         >>> from cbagan_ompl import GridMap
         >>> grid = GridMap.load("bundled:rooms")
         >>> prediction = Prediction(lambda: Heatmap.uniform(grid))
+        >>> prediction.start()
         >>> prediction.future.result().grid is grid
         True
     """
 
     def __init__(self, make: Callable[[], Heatmap]) -> None:
+        self.future: Future[Heatmap] = Future()
+        self._make = make
+        self._thread = Thread(target=self._run, name="cbagan-ompl-heatmap")
         self._began = perf_counter()
         self._seconds: float | None = None
-        pool = ThreadPoolExecutor(1, thread_name_prefix="cbagan-ompl-heatmap")
-        self.future: Future[Heatmap] = pool.submit(self._run, make)
-        pool.shutdown(wait=False)  # the thread ends when it has nothing more to do
+
+    def start(self) -> None:
+        """Begin to make it."""
+        self._began = perf_counter()
+        self._thread.start()
 
     def seconds(self) -> float:
         """Return how long it took, or has taken so far."""
@@ -85,11 +92,16 @@ class Prediction:
 
     def wait(self) -> None:
         """Wait until the thread has come to its end: what it does cannot be interrupted."""
-        wait([self.future])
+        if self._thread.is_alive():
+            self._thread.join()
 
-    def _run(self, make: Callable[[], Heatmap]) -> Heatmap:
-        try:
-            with _quick_turns:
-                return make()
-        finally:
-            self._seconds = perf_counter() - self._began
+    def _run(self) -> None:
+        with _quick_turns:
+            try:
+                heatmap = self._make()
+            except BaseException as error:  # which whoever waits for it raises
+                self._seconds = perf_counter() - self._began
+                self.future.set_exception(error)
+            else:
+                self._seconds = perf_counter() - self._began
+                self.future.set_result(heatmap)

@@ -223,6 +223,7 @@ def _run(job: _Job) -> PlanResult:
     if job.overlap:
         prediction = Prediction(partial(_make_heatmap, job))
         attachment = attach(setup, prediction.future, job.options)
+        prediction.start()
     elif job.make_heatmap is not None:
         attachment = attach(setup, _make_heatmap(job), job.options)
     waited_s = perf_counter() - began if attachment else 0.0

@@ -43,7 +43,10 @@ def robot_heatmap(
         'rooms (inflated by 1.58579)'
     """
     start, goal = position_of(robot, "start", start), position_of(robot, "goal", goal)
-    heatmap = source(passable_map(grid, robot, start, goal), start, goal)
+    passable = passable_map(grid, robot, start, goal)
+    heatmap = source(passable, start, goal)
+    if heatmap.grid is not passable:  # of a map of the caller's own
+        return heatmap
     return on_positions(heatmap, position_map(grid, robot))
 
 

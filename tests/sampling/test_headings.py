@@ -155,7 +155,8 @@ def test_one_by_one_as_many_at_once() -> None:
     ("name", "value"),
     [("spread", 0), ("spread", -1), ("spread", 4.0), ("spread", nan), ("spread", "wide"),
      ("uniform_fraction", 0), ("uniform_fraction", 1.5), ("uniform_fraction", None),
-     ("reverse_fraction", -0.1), ("reverse_fraction", 2), ("reverse_fraction", True)],
+     ("reverse_fraction", -0.1), ("reverse_fraction", 2), ("reverse_fraction", True),
+     ("approach_fraction", -0.1), ("approach_fraction", 1.1), ("approach_fraction", "0.1")],
 )  # fmt: skip
 def test_bad_spreads(name: str, value: Any) -> None:
     with pytest.raises(ConfigError, match=name):

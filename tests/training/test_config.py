@@ -61,7 +61,9 @@ def test_paper_preset_is_the_papers_table() -> None:
         "ema_decay": 0.0,
         "precision": "float32",
         "cost_maps": 0,
+        "passages": False,
         "white_obstacles": False,
+        "direction_weight": 1.0,
     }
     assert TrainingConfig.preset("paper").to_dict() == of_the_paper | not_given | not_used
 

@@ -13,7 +13,7 @@ from helpers.tiny_model import TINY, export_tiny_model
 torch = pytest.importorskip("torch")
 
 from cbagan_ompl import ConfigError, ModelError, load_model
-from cbagan_ompl.networks.export_model import RegionModel
+from cbagan_ompl.networks.export_model import make_region_model
 from cbagan_ompl.networks.factory import make_generator
 from cbagan_ompl.training.batches import encode, make_batch
 from cbagan_ompl.training.checkpoints import load_checkpoint
@@ -49,7 +49,7 @@ def test_recovered_generators_compute_what_the_models_do(name: str) -> None:
     task = inputs(128)
     expected = load_model(path).module(*task)
     assert expected.std() > 0.01, "or any generator would do"
-    torch.testing.assert_close(RegionModel(generator).eval()(*task), expected, atol=1e-4, rtol=0)
+    torch.testing.assert_close(make_region_model(generator)(*task), expected, atol=1e-4, rtol=0)
 
 
 @torch.no_grad()
@@ -89,7 +89,7 @@ def test_models_that_cannot_be_recovered(
     wider = TINY_PATCHES.network
     record = record | {"recipe": record["recipe"] | {"widths": list(wider.widths)}}
     generator = make_generator(TINY.network).eval()
-    save_script(RegionModel(generator).eval(), tmp_path / "other.pt", record)
+    save_script(make_region_model(generator), tmp_path / "other.pt", record)
     with pytest.raises(ModelError, match=r"cannot be recovered \(it has other weights"):
         recover_generator(tmp_path / "other.pt")
     monkeypatch.setattr("cbagan_ompl.training.model_weights._TOLERANCE", 0.0)
