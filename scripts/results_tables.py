@@ -23,6 +23,7 @@ from suite_tables import (
     ROOT,
     VERSIONS,
     conditions,
+    or_note,
     overhead,
     overview,
     read,
@@ -56,7 +57,7 @@ def main() -> None:
         return
     make_folder(args.output)
     for name, make in {**TABLES, **suite_tables()}.items():
-        write_atomically(args.output / f"{name}.md", make() + "\n")
+        write_atomically(args.output / f"{name}.md", or_note(make) + "\n")
     args.readme.write_text(with_table(args.readme.read_text(encoding="utf-8")), encoding="utf-8")
 
 
@@ -88,7 +89,8 @@ def unseen_maps_inference() -> str:
         "a SAGAN of the paper's size at the same resolution": "sagan_ms",
     }
     return table(
-        ["", "median time"], [[name, f"{timings[key]:.1f} ms"] for name, key in rows.items()]
+        ["", "median time"],
+        [[name, f"{timings[key]:.1f} ms"] for name, key in rows.items() if key in timings],
     )
 
 

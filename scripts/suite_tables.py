@@ -38,23 +38,22 @@ def versions_of(suite: str) -> list[str]:
     return [one for one in VERSIONS if (RESULTS / f"{suite}_ompl_{one}.json").exists()]
 
 
-def not_measured(name: str) -> str:
-    """Return what stands where a table would be, for results that have not been made yet."""
-    return f"*Not measured yet: `python benchmarks/run_all.py --only {name}`.*"
+def or_note(make: Callable[[], str]) -> str:
+    """Return a table, or a note where its result file has not been made yet."""
+    try:
+        return make()
+    except FileNotFoundError as error:
+        return f"*Not measured yet: `benchmarks/results/{Path(error.filename).name}`.*"
 
 
 def suite_ratios(suite: str) -> str:
-    if not versions_of(suite):
-        return not_measured(suite)
     return "\n\n".join(
         f"OMPL {version}:\n\n{ratios_table(read(f'{suite}_ompl_{version}.json'))}"
-        for version in versions_of(suite)
+        for version in versions_of(suite) or VERSIONS[:1]
     )
 
 
 def suite_times(suite: str) -> str:
-    if VERSIONS[0] not in versions_of(suite):
-        return not_measured(suite)
     return times_table(read(f"{suite}_ompl_{VERSIONS[0]}.json"), ("uniform", "learned", "corridor"))
 
 
@@ -105,8 +104,6 @@ def rrtconnect() -> str:
 
 
 def overhead() -> str:
-    if not (RESULTS / "overhead.json").exists():
-        return not_measured("overhead")
     result = read("overhead.json")
     ratios = result["ratios"]
     cells = [f"{value:.3f}" for value in (result["median"], min(ratios), max(ratios))]
