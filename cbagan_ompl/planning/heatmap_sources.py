@@ -40,7 +40,7 @@ SAMPLERS = {
 
 #: Pixels up to which the grid search makes its heat map sooner than the network; measured by
 #: scripts/search_speed.py, see docs/results/choices.md. A test holds it to the result file.
-MOST_CORRIDOR_PIXELS = 1450 * 1450
+MOST_CORRIDOR_PIXELS = 800 * 800
 
 #: What a result names its sampler when the caller brought the heat map.
 OWN_HEATMAP = "heatmap"
