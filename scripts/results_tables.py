@@ -23,7 +23,6 @@ from suite_tables import (
     ROOT,
     VERSIONS,
     conditions,
-    or_note,
     overhead,
     overview,
     read,
