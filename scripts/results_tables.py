@@ -16,7 +16,6 @@ from pathlib import Path
 
 from planner_tables import Json, ratios_table
 from search_speed import speed_table
-from study_tables import control, overlap
 from suite_tables import (
     ROOT,
     VERSIONS,
@@ -298,8 +297,6 @@ TABLES: dict[str, Callable[[], str]] = {
     "networks": networks,
     "paper_tables": paper_tables,
     "replanning": replanning,
-    "control": control,
-    "overlap": overlap,
     "search_speed": lambda: speed_table(read("search_speed.json")),
 }
 
