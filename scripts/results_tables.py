@@ -18,7 +18,6 @@ from calibrate import calibration_table, files_table
 from inference_speed import speed_table as speed_of_models
 from planner_tables import Json, ratios_table
 from search_speed import speed_table
-from study_tables import control, overlap
 from suite_tables import (
     ROOT,
     VERSIONS,
@@ -332,8 +331,6 @@ TABLES: dict[str, Callable[[], str]] = {
     "calibration": lambda: calibration_table(read("calibration.json")),
     "calibration_real_maps": lambda: files_table(read("calibration.json")),
     "inference_speed": lambda: speed_of_models(read("inference_speed.json")),
-    "control": control,
-    "overlap": overlap,
     "search_speed": lambda: speed_table(read("search_speed.json")),
 }
 

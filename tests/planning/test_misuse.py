@@ -92,6 +92,7 @@ PLAN_ARGUMENTS = (
     "radius",
     "model",
     "heatmap",
+    "overlap",
     "simplify",
     "goal_tolerance",
     "keep_tree",
