@@ -17,6 +17,7 @@ from pathlib import Path
 from calibrate import calibration_table, files_table
 from inference_speed import speed_table as speed_of_models
 from planner_tables import Json, ratios_table
+from robot_tables import car_suites, robot_paths
 from search_speed import speed_table
 from study_tables import control, overlap
 from suite_tables import (
@@ -334,6 +335,8 @@ TABLES: dict[str, Callable[[], str]] = {
     "inference_speed": lambda: speed_of_models(read("inference_speed.json")),
     "control": control,
     "overlap": overlap,
+    "robot_paths": robot_paths,
+    "car_suites": car_suites,
     "search_speed": lambda: speed_table(read("search_speed.json")),
 }
 
