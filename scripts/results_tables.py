@@ -17,6 +17,7 @@ from pathlib import Path
 from calibrate import calibration_table, files_table
 from inference_speed import speed_table as speed_of_models
 from planner_tables import Json, ratios_table
+from robot_tables import car_suites, robot_paths
 from search_speed import speed_table
 from suite_tables import (
     ROOT,
@@ -331,6 +332,8 @@ TABLES: dict[str, Callable[[], str]] = {
     "calibration": lambda: calibration_table(read("calibration.json")),
     "calibration_real_maps": lambda: files_table(read("calibration.json")),
     "inference_speed": lambda: speed_of_models(read("inference_speed.json")),
+    "robot_paths": robot_paths,
+    "car_suites": car_suites,
     "search_speed": lambda: speed_table(read("search_speed.json")),
 }
 

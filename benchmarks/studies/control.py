@@ -13,20 +13,29 @@ from __future__ import annotations
 import argparse
 import json
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from math import cos, inf, pi, sin
 from pathlib import Path
 from time import thread_time
 from typing import Any
 
 import numpy as np
-from headings import PoseTask, file_tasks, generated_tasks
 from ompl import base as ob
 from ompl import control as oc
 from ompl import util as ou
+from pose_runs import PoseTask, generated_tasks, pose_task
 
-from cbagan_ompl import HeadingSpread, Robot, RobotValidityChecker, attach, load_model
+from cbagan_ompl import (
+    GridMap,
+    HeadingSpread,
+    Robot,
+    RobotValidityChecker,
+    attach,
+    load_model,
+    tasks_of,
+)
 from cbagan_ompl.common.files import write_json
+from cbagan_ompl.maps.tasks import load_tasks
 from cbagan_ompl.planning import compat
 
 # Pixels and seconds: the car, its fastest speed and sharpest turn, and the step of its motion.
@@ -39,6 +48,20 @@ SAMPLERS: dict[str, HeadingSpread | None] = {
     "positions only": HeadingSpread(uniform_fraction=1),
     "learned": HeadingSpread(),
 }
+
+
+def file_tasks(args: argparse.Namespace) -> Iterator[PoseTask]:
+    """Yield the few tasks on each map that are the longest for the car."""
+    for word in args.maps:
+        grid = GridMap.load(word)
+        wide = grid.inflated(CAR.inscribed_radius)
+        tasks = load_tasks(args.tasks, grid) if args.tasks else tasks_of(word, grid)
+        poses = [
+            pose_task(f"{grid.name}-{number}", grid, wide, task.start, task.goal, CAR)
+            for number, task in enumerate(tasks)
+        ]
+        fitting = [task for task in poses if task is not None]
+        yield from sorted(fitting, key=lambda task: -task.length)[: args.tasks_per_map]
 
 
 def main() -> None:

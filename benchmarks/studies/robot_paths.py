@@ -63,7 +63,7 @@ OWN, POSITIONS, DEFAULT, CORRIDOR = "OMPL's own", "positions only", "default", "
 SAMPLERS = (OWN, POSITIONS, DEFAULT, CORRIDOR)
 TIGHT_SPACE = "SE2 tight"
 PLANNERS = ("RRTstar", "RRT")
-RESAMPLES = 1000
+RESAMPLES = 300
 
 FloatArray = NDArray[np.float64]
 Measure = Callable[[FloatArray, FloatArray], float | None]

@@ -249,7 +249,7 @@ def _source(args: argparse.Namespace, config: TrainingConfig) -> AbstractContext
 
         check_trainable(args.size, config)
         settings = SyntheticSettings(
-            args.size, args.generators, args.hard_fraction, args.synthetic_seed
+            args.size, args.generators, args.hard_fraction, seed=args.synthetic_seed
         )
         return synthetic_source(settings, SyntheticSchedule(args.maps, args.held_out, args.jobs))
     dataset = load_dataset(args.dataset)

@@ -32,8 +32,8 @@ def lowered_pixels(
         >>> distances = np.ones((1, 2, 4, 1, 1), np.float32)
         >>> distances[0, :, 1] = 2.0
         >>> lowered = lowered_pixels(np.ones((1, 4, 1, 1), np.float32), codes, distances)
-        >>> lowered[0, 0, 0].round(1)[[0, 15]].tolist()
-        [0.0, -9.8]
+        >>> lowered[0, 0, 0, [0, 15]].astype(float).round(1).tolist()
+        [0.0, -8.2]
     """
     batch, nodes, height, width = codes.shape
     result = np.zeros((batch, height, width, 16), np.float32)

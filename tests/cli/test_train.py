@@ -137,7 +137,7 @@ def test_train_and_export_on_synthetic_maps(
         (
             ["--synthetic", "--preset", "synthetic", "--size", "64"],
             DatasetError,
-            "discriminators take images of at least 128 pixels; these have 64",
+            "discriminators take images of at least 96 pixels; these have 64",
         ),
         (["--synthetic", "--maps", "0"], ConfigError, "maps is a whole number of at least 1"),
         (["--synthetic", "--hard-fraction", "2"], ConfigError, "hard_fraction"),

@@ -239,7 +239,7 @@ def test_every_wrong_argument_is_named_or_works(name: str) -> None:
 def test_the_table_covers_the_public_names() -> None:
     assert len(CALLS) * len(POOL) >= 2500
     callables = {name.partition("(")[0].partition(".")[0] for name in CALLS}
-    made_by_us = {"Attachment", "PlanResult", "Task"}
+    made_by_us = {"Attachment", "Guarantee", "PlanResult", "Task"}
     no_arguments = {"bundled_maps", "reached_control_planners", "reached_planners"}
     errors = {name for name in cbagan_ompl.__all__ if name.endswith(("Error", "Warning"))}
     assert set(cbagan_ompl.__all__) <= callables | made_by_us | no_arguments | errors

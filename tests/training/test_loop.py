@@ -17,7 +17,7 @@ from cbagan_ompl import ConfigError
 from cbagan_ompl.training import loop
 from cbagan_ompl.training.checkpoints import load_checkpoint
 from cbagan_ompl.training.export import export
-from cbagan_ompl.training.gan import Gan
+from cbagan_ompl.training.gan import Gan, Painted
 from cbagan_ompl.training.loop import train
 from cbagan_ompl.training.task_sources import DatasetSource
 
@@ -225,13 +225,13 @@ def test_what_the_generator_is_trained_on(
     gan, cpu = Gan(config, torch.device("cpu")), torch.device("cpu")
     run = loop.Run(gan, np.random.default_rng(0), torch.Generator().manual_seed(0))
     seen: list[tuple[torch.Tensor, ...]] = []
-    original = gan.run
+    original = gan.generate
 
-    def record(name: str, *inputs: torch.Tensor, trained: bool = True) -> torch.Tensor:
+    def record(*inputs: torch.Tensor) -> Painted:
         seen.append(inputs)
-        return original(name, *inputs, trained=trained)
+        return original(*inputs)
 
-    monkeypatch.setattr(gan, "run", record)
+    monkeypatch.setattr(gan, "generate", record)
     for step in range(40):
         loop._step(run, config, source.epoch(0), np.zeros(2, np.int64), cpu, step)
     assert {inputs[0].shape[-1] for inputs in seen} == sizes
