@@ -276,7 +276,7 @@ def test_a_path_is_there_before_the_heat_map(monkeypatch: pytest.MonkeyPatch) ->
     wait_until_gone()
 
 
-@pytest.mark.usefixtures("two_cores")
+@pytest.mark.usefixtures("two_cores", "interruptible")
 def test_an_interrupt_leaves_no_thread_behind(monkeypatch: pytest.MonkeyPatch) -> None:
     release = threading.Event()
     make_slow(monkeypatch, release)
