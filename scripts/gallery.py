@@ -30,7 +30,7 @@ def main() -> None:
         task = tasks_of(f"bundled:{name}", grid)[number]
         # First, because the first call of a size takes longer.
         raw = predictor.predict(grid, task.start, task.goal, repair=False)
-        result = plan(grid, task.start, task.goal, model=predictor, time=0.3, range=20, seed=0)
+        result = plan(grid, task.start, task.goal, model=predictor, time=1, range=20, seed=0)
         draw_plan(axes, result, grid)
         state = "connected" if raw.connects(task.start, task.goal) else "repaired"
         axes.set_title(f"{name}: {state}, {1e3 * result.inference_s:.0f} ms", fontsize=9)
