@@ -41,14 +41,12 @@ def full_nodes(
         codes = np.zeros((4, *patches), np.int32)
         _read_patches(free, codes, _NODES_OF, _IS_KNOWN)
         return codes, link_bits(codes[None])[0]
-    edges = [
-        np.append(np.arange(n) * size // n, size) for n, size in zip(shape, free.shape, strict=True)
-    ]
+    rows, columns = _edges(free.shape, shape)
     nodes = np.zeros(free.shape, np.uint8)
     codes = np.zeros((4, *patches), np.int32)
     linked = np.zeros((4, *patches), np.uint16)
-    _label(free, edges[0], edges[1], nodes, codes)
-    _link(nodes, edges[0][:-1:4], edges[1][:-1:4], linked)
+    _label(free, rows, columns, nodes, codes)
+    _link(nodes, rows[:-1:4], columns[:-1:4], linked)
     return codes, linked
 
 
@@ -69,9 +67,7 @@ def full_node_of(
     Returns:
         The index into the codes, flattened, as of :func:`.passages.endpoint_nodes`.
     """
-    rows, columns = (
-        np.append(np.arange(n) * size // n, size) for n, size in zip(shape, free.shape, strict=True)
-    )
+    rows, columns = _edges(free.shape, shape)
     row = (int(np.searchsorted(rows, pixel[1], "right")) - 1) // 4
     column = (int(np.searchsorted(columns, pixel[0], "right")) - 1) // 4
     top, bottom = rows[4 * row], rows[min(4 * row + 4, shape[0])]
@@ -84,6 +80,11 @@ def full_node_of(
     _label(np.ascontiguousarray(block), heights, widths, nodes, own)
     node = max(0, int(nodes[pixel[1] - top, pixel[0] - left]) - 1)
     return int((node * codes.shape[1] + row) * codes.shape[2] + column)
+
+
+def _edges(full: tuple[int, ...], scaled: tuple[int, int]) -> list[NDArray[np.int64]]:
+    """Return where the rows and columns of the scaled map begin in the full one, and its end."""
+    return [np.append(np.arange(n) * size // n, size) for n, size in zip(scaled, full, strict=True)]
 
 
 @compiled
