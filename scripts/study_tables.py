@@ -7,7 +7,12 @@ from suite_tables import Json, read
 from cbagan_ompl.common.markdown import table
 
 VERSIONS = ("2.0.1", "1.7.0")
-MAPS = {"bundled": "bundled maps", "generated": "generated maps", "real_maps": "real maps"}
+MAPS = {
+    "bundled": "bundled maps",
+    "generated": "generated maps",
+    "real_maps": "real maps",
+    "street_maps": "street maps",
+}
 
 
 def control() -> str:
@@ -31,7 +36,7 @@ def overlap() -> str:
     """Return the times to the first path with overlapped inference and without."""
     files = {
         f"{MAPS[maps]}, {version}": f"overlap_{maps}_ompl_{version}.json"
-        for maps in ("bundled", "real_maps")
+        for maps in ("bundled", "real_maps", "street_maps")
         for version in VERSIONS
     }
     files["bundled maps, 2.0.1, one core"] = "overlap_one_core.json"
