@@ -173,6 +173,21 @@ def spread(interval: list[float], form: str) -> str:
     return f"{mean:{form}} ({low:{form}} to {high:{form}})"
 
 
+def refinement() -> str:
+    rows = []
+    for row in read("refinement.json")["maps"]:
+        for model, result in row["scores"].items():
+            values = result["scores"] | {"intervals": result["intervals"]}
+            cells = [bracketed(values, name) for name in ("iou", "dice", "connectivity")]
+            rows.append([row["map"], model.replace("refined-", "refined, seed "), *cells])
+    return table(["map", "model", "IoU", "Dice", "connected (8)"], rows)
+
+
+def bracketed(values: Json, name: str) -> str:
+    low, high = values["intervals"][name]
+    return f"{values[name]:.3f} [{low:.3f}, {high:.3f}]"
+
+
 def generated_maps() -> str:
     models = read("generated_maps.json")["models"]
     names = {"before": "version 0.2", "not learned": "not learned", "bundled": "bundled model"}
@@ -329,6 +344,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "labels": labels,
     "generated_maps": generated_maps,
     "ablation": ablation,
+    "refinement": refinement,
     "regions": regions,
     "label_noise": label_noise,
     "networks": networks,
