@@ -72,7 +72,6 @@ def test_directions_lead_along_the_shortest_path() -> None:
     assert (length[inside] > 0).all()
 
 
-@pytest.mark.filterwarnings("error")
 def test_a_task_without_a_path_has_no_region() -> None:
     free = np.ones((8, 9), bool)
     free[:, 4] = False
