@@ -75,7 +75,7 @@ class RobotMotionValidator(ob.MotionValidator):  # type: ignore[misc]
     and ReedsSheppStateSpace, as OMPL interpolates them. No step width: a collision is never
     missed. A motion along which the robot comes nearer to an obstacle than
     :data:`cbagan_ompl.robots.pieces.CONSERVATISM` pixels may be refused; straight motions
-    without a turn are exact. The check of straight motions is compiled,
+    without a turn are exact. The checks are compiled,
     which takes seconds once and is kept on disk.
 
     Args:
@@ -108,8 +108,7 @@ class RobotMotionValidator(ob.MotionValidator):  # type: ignore[misc]
         super().__init__(si)
         self._checker = checker
         self._curvature = _largest_curvature(pose_space(self._space))
-        if self._curvature is None:
-            checker.compile()
+        checker.compile()
         # States of its own: one for poses on the way of a curve, one for the end of a part.
         self._middle, self._part_end = (compat.new_state(self._space) for _ in range(2))
 

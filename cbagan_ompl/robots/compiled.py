@@ -1,4 +1,4 @@
-"""Straight motions of a shape, compiled: the same answers as in Python, many times sooner.
+"""Exact tests of a shape, compiled: the same answers as in Python, many times sooner.
 
 The algorithm is that of :mod:`.shape_checker`, which explains it; the tests hold the two together.
 """
@@ -18,6 +18,11 @@ TURN = 2 * pi
 _SIGNATURE = (
     "int64(float64, float64, float64, float64, float64, float64, uint8[:, ::1], int64[::1],"
     "uint16[:, ::1], float64[:, ::1], int64[::1], float64[:, ::1])"
+)
+
+_POSE_SIGNATURE = (
+    "boolean(float64, float64, float64, float64, uint16[:, ::1], float64[:, ::1], int64[::1],"
+    "float64[:, ::1])"
 )
 
 # Most parts of a motion that are left to the exact test one by one; beyond that all of it is.
@@ -262,3 +267,30 @@ def straight_is_free(
         turn *= constants[9]
     motion = (u, v, heading, du, dv, turn)
     return _motion_is_free(motion, tables, counts, runs, parts, starts, scratch, constants)
+
+
+@partial(compiled, signature=_POSE_SIGNATURE)
+def pose_is_free(
+    u: float,
+    v: float,
+    heading: float,
+    margin: float,
+    runs: Any,
+    parts: Any,
+    starts: Any,
+    scratch: Any,
+) -> bool:
+    """Return whether a shape with a margin around it touches nothing at a pose.
+
+    Args:
+        u: of the pose, pixels.
+        v: of the pose, pixels.
+        heading: of the pose, in the frame of the pixels.
+        margin: added around, pixels.
+        runs: see :func:`straight_is_free`.
+        parts: see there.
+        starts: see there.
+        scratch: see there.
+    """
+    motion = (u, v, heading, 0.0, 0.0, 0.0)
+    return _swept_is_free(motion, 0.0, 0.0, margin, runs, parts, starts, scratch)

@@ -31,6 +31,9 @@ _COMPILED_USES = 500.0
 # not hide it: a margin of the shape, in pixels. Points have none, see `region_is_free`.
 _ROUNDING = 1e-9
 
+# Where a motion is looked at first, as fractions of it: at its end, where motions often fail.
+_FIRST_LOOKS = (0.5, 1.0)
+
 # Least movement between two looks at a motion where the tables do not know, in pixels.
 _LOOK = 1.0
 
@@ -69,6 +72,7 @@ class ShapeChecker:
         self._rounding = 0.0 if len(self._parts[0]) == 1 else _ROUNDING
         self._per_radian = self.tables.count / _TURN
         self._compiled: Callable[..., int] | None = None
+        self._compiled_pose: Callable[..., bool] | None = None
         self._buffers: tuple[Any, ...] = ()
         self._clearance = ShapeClearance(grid.free, self.shape)
 
@@ -87,29 +91,22 @@ class ShapeChecker:
         return checker
 
     def compile(self) -> None:
-        """Compile the check of straight motions. Answers do not change.
+        """Compile straight motions and the exact test of a pose. Answers do not change.
 
         The first time takes seconds; the result is kept on disk, and later processes load it.
         """
         if self._compiled is None:
-            from .compiled import straight_is_free
+            from .compiled import pose_is_free, straight_is_free
 
             self._buffers = self._make_buffers()
-            self._compiled = straight_is_free
+            self._compiled, self._compiled_pose = straight_is_free, pose_is_free
 
     def pose_is_free(self, x: float, y: float, yaw: float) -> bool:
         """Return whether the robot at a pose touches nothing; world coordinates."""
         a, b, c, d, e, f = self._affine
         u, v = a * x + b * y + c, d * x + e * y + f
         heading = (self.shape.sign * yaw + self.shape.phase) % _TURN
-        # Comparisons that NaN fails.
-        if not (0 <= u < self._runs.width and 0 <= v < self._runs.height and heading >= 0):
-            return False
-        index = int(heading * self._per_radian)
-        cell = int(v) * self._runs.width + int(u)
-        value = self.tables.by_heading[index][cell]
-        if value == UNKNOWN and self.tables.refine(index):
-            value = self.tables.by_heading[index][cell]
+        value = self._value_at((u, v, heading))
         if value == UNKNOWN:
             return self._swept_is_free((u, v, heading), None, self._rounding)
         return value != BLOCKED
@@ -218,30 +215,25 @@ class ShapeChecker:
             pose_at: the motion, over 0 to 1.
             movement: how far any point of the shape moves over all of it, at most; pixels.
         """
-        by_heading, refine = self.tables.by_heading, self.tables.refine
-        per_radian, (_, width, height) = self._per_radian, self._runs
         # As a fraction of the motion: how much a unit of the tables clears, and the least step.
         per_value, look = (STEP / movement, _LOOK / movement) if movement else (2.0, 2.0)
-        gaps: list[tuple[float, float]] = []
-        # The motion is known to be free up to `done` and from `end` on.
-        done, end, t = 0.0, 1.0, 1.0
-        while True:
-            u, v, heading = pose_at(t)
-            if not (0 <= u < width and 0 <= v < height and heading >= 0):
-                return None
-            index = int(heading * per_radian)
-            value = by_heading[index][int(v) * width + int(u)]
-            if value == UNKNOWN and refine(index):
-                value = by_heading[index][int(v) * width + int(u)]
+        # Most motions that collide do so at one of these places, the last of which is the end.
+        value = UNKNOWN
+        for t in _FIRST_LOOKS:
+            value = self._value_at(pose_at(t))
             if value == BLOCKED:
                 return None
-            # Over the reach the shape keeps a unit of the tables away from obstacles.
-            reach = (value - CLEAR) * per_value
-            if t == 1.0:
-                # The end is looked at first, since motions often fail there.
-                end, t = (1.0 - reach if value > CLEAR else 1.0), 0.0
-                continue
+        gaps: list[tuple[float, float]] = []
+        # Over its reach the shape keeps a unit of the tables away from obstacles. The motion is
+        # known to be free up to `done` and from `end` on.
+        end = 1.0 - max(0, value - CLEAR) * per_value
+        done = t = 0.0
+        while True:
+            value = self._value_at(pose_at(t))
+            if value == BLOCKED:
+                return None
             if value > CLEAR:
+                reach = (value - CLEAR) * per_value
                 if t - reach > done:
                     gaps.append((done, t - reach))
                 done = t = t + reach
@@ -251,6 +243,19 @@ class ShapeChecker:
                 if done < end:
                     gaps.append((done, end))
                 return gaps
+
+    def _value_at(self, pose: Pose) -> int:
+        """Return what the tables know of a pose; outside of the map it is blocked."""
+        u, v, heading = pose
+        _, width, height = self._runs
+        if not (0 <= u < width and 0 <= v < height and heading >= 0):
+            return BLOCKED
+        index = int(heading * self._per_radian)
+        cell = int(v) * width + int(u)
+        value = self.tables.by_heading[index][cell]
+        if value == UNKNOWN and self.tables.refine(index):
+            value = self.tables.by_heading[index][cell]
+        return value
 
     def _straight_gap_is_free(self, pose_at: PoseAt, turn: float, low: float, high: float) -> bool:
         """Return whether a part of a straight motion is free; the whole turns by ``turn``."""
@@ -293,6 +298,9 @@ class ShapeChecker:
             end: another, or None.
             margin: added around, pixels.
         """
+        if end is None and self._compiled_pose is not None:
+            u, v, heading = start if self.shape.turns else (*start[:2], 0.0)
+            return self._compiled_pose(u, v, heading, margin, *self._buffers[2:])
         poses = (start,) if end is None else (start, end)
         turned = [(u, v, cos(heading), sin(heading)) for u, v, heading in poses]
         if not self.shape.turns:
