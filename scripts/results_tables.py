@@ -154,18 +154,22 @@ def sharpness() -> str:
 
 
 def ablation() -> str:
-    results = read("worlds_ablation.json")
-    names = {
-        "full": "the whole",
-        "supervised": "without the adversarial part",
-        "no-fronts": "without the distance fields",
-    }
-    tests = {name: results[key]["test"] for key, name in names.items()}
-    rows = [
-        [name, f"{scores['iou']:.3f}", f"{scores['dice']:.3f}", connected(scores)]
-        for name, scores in tests.items()
-    ]
-    return table(["network", "IoU", "Dice", "connected (8)"], rows)
+    variants = read("ablation.json")["variants"]
+    rows = []
+    for name, scores in variants.items():
+        runs = scores["seeds"]
+        dice = sum(run["dice"] for run in runs) / len(runs)
+        least = min(run["connectivity"] for run in runs)
+        difference = spread(scores["difference"], "+.4f") if "difference" in scores else "-"
+        ious = spread(scores["iou"], ".4f")
+        rows.append([name, len(runs), ious, difference, f"{dice:.4f}", f"{100 * least:.1f} %"])
+    header = ["network", "seeds", "IoU", "difference from the whole", "Dice"]
+    return table([*header, "connected (8), least"], rows)
+
+
+def spread(interval: list[float], form: str) -> str:
+    mean, low, high = interval
+    return f"{mean:{form}} ({low:{form}} to {high:{form}})"
 
 
 def generated_maps() -> str:
