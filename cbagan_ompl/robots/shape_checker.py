@@ -71,8 +71,8 @@ class ShapeChecker:
         self._parts = [part.tolist() for part in self.shape.parts]
         self._rounding = 0.0 if len(self._parts[0]) == 1 else _ROUNDING
         self._per_radian = self.tables.count / _TURN
-        self._compiled: Callable[..., int] | None = None
-        self._compiled_pose: Callable[..., bool] | None = None
+        self._compiled: Any = None
+        self._find_curve: Callable[..., bool] | None = None
         self._buffers: tuple[Any, ...] = ()
         self._clearance = ShapeClearance(grid.free, self.shape)
 
@@ -90,16 +90,22 @@ class ShapeChecker:
         _KEPT.append(checker)
         return checker
 
-    def compile(self) -> None:
-        """Compile straight motions and the exact test of a pose. Answers do not change.
+    def compile(self, curves: bool = False) -> None:
+        """Compile the checks. Answers do not change.
 
         The first time takes seconds; the result is kept on disk, and later processes load it.
+
+        Args:
+            curves: whether Dubins and Reeds-Shepp curves are to be checked as well.
         """
         if self._compiled is None:
-            from .compiled import pose_is_free, straight_is_free
+            from . import compiled
 
-            self._buffers = self._make_buffers()
-            self._compiled, self._compiled_pose = straight_is_free, pose_is_free
+            self._buffers, self._compiled = self._make_buffers(), compiled
+        if curves:
+            from .compiled_curves import find_curve
+
+            self._find_curve = find_curve
 
     def pose_is_free(self, x: float, y: float, yaw: float) -> bool:
         """Return whether the robot at a pose touches nothing; world coordinates."""
@@ -120,10 +126,8 @@ class ShapeChecker:
         OMPL's SE2StateSpace.
         """
         if self._compiled is not None:
-            answer = self._compiled(x0, y0, yaw0, x1, y1, yaw1, *self._buffers)
-            if answer > 1:
-                self.tables.make(answer // 2 - 1)
-            return answer & 1 == 1
+            motion = x0, y0, yaw0, x1, y1, yaw1
+            return self._answer(self._compiled.straight_is_free(*motion, *self._buffers))
         a, b, c, d, e, f = self._affine
         u, v = a * x0 + b * y0 + c, d * x0 + e * y0 + f
         du, dv = a * (x1 - x0) + b * (y1 - y0), d * (x1 - x0) + e * (y1 - y0)
@@ -148,7 +152,11 @@ class ShapeChecker:
         return all(self._straight_gap_is_free(pose_at, abs(turn), *gap) for gap in gaps)
 
     def curve_is_free(
-        self, world_pose_at: Callable[[float], Pose], length: float, turn: float
+        self,
+        world_pose_at: Callable[[float], Pose],
+        length: float,
+        turn: float,
+        reverses: bool | None = None,
     ) -> bool:
         """Return whether the robot touches nothing on a curve.
 
@@ -157,6 +165,7 @@ class ShapeChecker:
                 move faster than evenly along ``length``, nor turn faster than evenly by ``turn``.
             length: of the way of the reference point, world units.
             turn: by which the heading changes at most, in all, radians.
+            reverses: whether it is a Reeds-Shepp curve, not a Dubins curve; None if neither.
         """
         a, b, c, d, e, f = self._affine
         sign, phase = self.shape.sign, self.shape.phase
@@ -166,9 +175,15 @@ class ShapeChecker:
             heading = (sign * yaw + phase) % _TURN
             return a * x + b * y + c, d * x + e * y + f, heading
 
-        if not self.shape.turns:
-            turn = 0.0
-        movement = length / self.grid.resolution + self.shape.radius * turn
+        pixels = length / self.grid.resolution
+        movement = pixels + self.shape.radius * (turn if self.shape.turns else 0.0)
+        if self._find_curve is not None and reverses is not None and turn > 0:
+            ends = pose_at(0.0), pose_at(0.5), pose_at(1.0)
+            poses = (*ends[0], *ends[1], *ends[2])
+            arcs = self._buffers[-1][9]
+            if self._find_curve(*poses, pixels, pixels / turn, reverses, arcs):
+                motion = *ends[0], movement
+                return self._answer(self._compiled.curve_is_free(*motion, *self._buffers))
         gaps = self._march(pose_at, movement)
         if gaps is None:
             return False
@@ -187,6 +202,12 @@ class ShapeChecker:
         heading = self.shape.sign * yaw + self.shape.phase
         return self._clearance(u, v, heading) * self.grid.resolution
 
+    def _answer(self, answer: int) -> bool:
+        """Return the answer of a compiled check, and make the table that it asks for."""
+        if answer > 1:
+            self.tables.make(answer // 2 - 1)
+        return answer & 1 == 1
+
     def _make_buffers(self) -> tuple[Any, ...]:
         """Return all arguments of the compiled check but the motion."""
         shape, tables = self.shape, self.tables
@@ -199,7 +220,7 @@ class ShapeChecker:
             *(self._rounding, _COMPILED_USES, float(shape.turns), shape.sign, shape.phase),
             *self._affine,
         )
-        scratch = np.zeros((9, max(32, height + 2, 2 * max(counts))))
+        scratch = np.zeros((10, max(32, height + 2, 2 * max(counts))))
         scratch[8, : len(constants)] = constants
         starts = np.cumsum([0, *counts])
         return tables.stack, tables.counts, runs, np.concatenate(shape.parts), starts, scratch
@@ -298,9 +319,8 @@ class ShapeChecker:
             end: another, or None.
             margin: added around, pixels.
         """
-        if end is None and self._compiled_pose is not None:
-            u, v, heading = start if self.shape.turns else (*start[:2], 0.0)
-            return self._compiled_pose(u, v, heading, margin, *self._buffers[2:])
+        if end is None and self._compiled is not None:
+            return bool(self._compiled.pose_is_free(*start, margin, *self._buffers[2:]))
         poses = (start,) if end is None else (start, end)
         turned = [(u, v, cos(heading), sin(heading)) for u, v, heading in poses]
         if not self.shape.turns:
