@@ -19,6 +19,7 @@ from inference_speed import speed_table as speed_of_models
 from planner_tables import Json, ratios_table
 from robot_tables import car_suites, robot_paths
 from search_speed import speed_table
+from study_tables import control, overlap
 from suite_tables import (
     ROOT,
     VERSIONS,
@@ -170,6 +171,21 @@ def ablation() -> str:
 def spread(interval: list[float], form: str) -> str:
     mean, low, high = interval
     return f"{mean:{form}} ({low:{form}} to {high:{form}})"
+
+
+def refinement() -> str:
+    rows = []
+    for row in read("refinement.json")["maps"]:
+        for model, result in row["scores"].items():
+            values = result["scores"] | {"intervals": result["intervals"]}
+            cells = [bracketed(values, name) for name in ("iou", "dice", "connectivity")]
+            rows.append([row["map"], model.replace("refined-", "refined, seed "), *cells])
+    return table(["map", "model", "IoU", "Dice", "connected (8)"], rows)
+
+
+def bracketed(values: Json, name: str) -> str:
+    low, high = values["intervals"][name]
+    return f"{values[name]:.3f} [{low:.3f}, {high:.3f}]"
 
 
 def generated_maps() -> str:
@@ -328,6 +344,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "labels": labels,
     "generated_maps": generated_maps,
     "ablation": ablation,
+    "refinement": refinement,
     "regions": regions,
     "label_noise": label_noise,
     "networks": networks,
@@ -338,6 +355,8 @@ TABLES: dict[str, Callable[[], str]] = {
     "inference_speed": lambda: speed_of_models(read("inference_speed.json")),
     "robot_paths": robot_paths,
     "car_suites": car_suites,
+    "control": control,
+    "overlap": overlap,
     "search_speed": lambda: speed_table(read("search_speed.json")),
 }
 
