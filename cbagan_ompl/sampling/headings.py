@@ -159,7 +159,8 @@ class HeadingSampler:
         reverses: bool = False,
     ) -> None:
         grid = heatmap.grid
-        self._headings = None if heatmap.heading is None else heatmap.heading.reshape(-1).data
+        known = None if options.uniform_fraction == 1 else heatmap.heading
+        self._headings = None if known is None else known.reshape(-1).data
         self._affine = tuple(grid.pixel_from_world)
         self._width, self._height = grid.width, grid.height
         self._options, self._rng, self._reverses = options, rng, reverses

@@ -145,6 +145,8 @@ def test_which_poses_follow_the_headings(heading: float) -> None:
         assert not both.are_followed(5.0, 5.0, heading + turn)
         assert forwards.are_followed(50.0, 5.0, heading + turn), "where nothing is known"
         assert forwards.are_followed(-50.0, 5.0, heading + turn), "off the map"
+        off = HeadingSampler(heatmap, HeadingSpread(uniform_fraction=1), np.random.default_rng(0))
+        assert off.are_followed(5.0, 5.0, heading + turn)
 
 
 def test_reversals() -> None:
