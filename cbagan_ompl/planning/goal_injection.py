@@ -10,10 +10,14 @@ from .awaited import AwaitedHeatmap
 from .compat import ob
 from .goal_approach import GoalApproach, goal_approach
 from .goal_monitor import GoalMonitor
+from .sample_budget import needs_many_poses
 from .states import StateAccess
 
 # What RRT-like planners compare their number of goal states with: never enough.
 _ENDLESS = 10**9
+
+# Headings in collision that are rejected in a row: to look costs less than to extend the tree.
+_MOST_REJECTED = 3
 
 # Fraction of the samples that are the true goal until the planner has reached it: OMPL's own bias.
 _GOAL_BIAS = 0.05
@@ -47,6 +51,8 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
         self._threshold = original.getThreshold()
         self.setThreshold(self._threshold)
         self._original = original
+        # What tells which poses collide; None where that does not matter.
+        self._si = si if needs_many_poses(monitor.setup.getPlanner()) else None
         self._states = states
         self._monitor = monitor
         self._awaited: AwaitedHeatmap | None = None
@@ -68,7 +74,7 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
         if monitor.is_trusted:
             x, y = self._states.read(state)
             in_goal = distance < self._threshold
-            self._sampler.on_new_node(x, y, in_goal)
+            self._sampler.on_new_node(x, y, in_goal, self._states.follows_heatmap(state))
             if in_goal:
                 monitor.note_reached()
         return distance
@@ -110,7 +116,17 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
             self._original.sampleGoal(state)
             self._approach.move_back(state)
         else:
-            self._states.write(state, *self._sampler.next())
+            self._sample_heatmap(state)
+
+    def _sample_heatmap(self, state: Any) -> None:
+        """Sample the heat map; a pose in collision gets another heading, a few times."""
+        x, y = self._sampler.next()
+        self._states.write(state, x, y)
+        if self._si is not None:
+            for _ in range(_MOST_REJECTED):
+                if self._si.isValid(state):
+                    return
+                self._states.write(state, x, y)
 
     def _take(self, sampler: HeatmapSampler) -> None:
         self._sampler = sampler

@@ -13,7 +13,7 @@ from ..robots.robot import Robot, check_robot
 from ..robots.shape_checker import Pose, ShapeChecker
 from . import compat
 from .compat import ob
-from .states import pose_space, space_of, state_access
+from .states import drives_backwards, pose_space, space_of, state_access
 from .validity import set_last_valid
 
 
@@ -75,7 +75,7 @@ class RobotMotionValidator(ob.MotionValidator):  # type: ignore[misc]
     and ReedsSheppStateSpace, as OMPL interpolates them. No step width: a collision is never
     missed. A motion along which the robot comes nearer to an obstacle than
     :data:`cbagan_ompl.robots.pieces.CONSERVATISM` pixels may be refused; straight motions
-    without a turn are exact. The check of straight motions is compiled,
+    without a turn are exact. The checks are compiled,
     which takes seconds once and is kept on disk.
 
     Args:
@@ -108,8 +108,8 @@ class RobotMotionValidator(ob.MotionValidator):  # type: ignore[misc]
         super().__init__(si)
         self._checker = checker
         self._curvature = _largest_curvature(pose_space(self._space))
-        if self._curvature is None:
-            checker.compile()
+        self._reverses = drives_backwards(self._space)
+        checker.compile(curves=self._curvature is not None)
         # States of its own: one for poses on the way of a curve, one for the end of a part.
         self._middle, self._part_end = (compat.new_state(self._space) for _ in range(2))
 
@@ -140,7 +140,8 @@ class RobotMotionValidator(ob.MotionValidator):  # type: ignore[misc]
 
         # Of the poses alone: in a compound space the other parts have a share in the distance.
         length = self._pose_distance(s1, s2)
-        return self._checker.curve_is_free(pose_at, length, length * self._curvature)
+        turn = length * self._curvature
+        return self._checker.curve_is_free(pose_at, length, turn, self._reverses)
 
     def _pose_distance(self, s1: Any, s2: Any) -> float:
         space = pose_space(self._space)

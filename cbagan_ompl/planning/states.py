@@ -41,6 +41,9 @@ class StateAccess(Protocol):
             yaw: radians.
         """
 
+    def follows_heatmap(self, state: Any) -> bool:
+        """Return whether a state goes about the way of the heat map, as far as that is known."""
+
 
 class PlaneStateAccess:
     """Access to states of a RealVectorStateSpace of dimension 2.
@@ -73,6 +76,10 @@ class PlaneStateAccess:
     def write_pose(self, state: Any, x: float, y: float, yaw: float) -> None:
         """Set (x, y); arguments as for :meth:`StateAccess.write_pose`, without a yaw to be set."""
         self.write(state, x, y)
+
+    def follows_heatmap(self, state: Any) -> bool:
+        """Return True: positions have no heading."""
+        return True
 
 
 class PoseStateAccess:
@@ -112,6 +119,10 @@ class PoseStateAccess:
         changed.setY(y)
         changed.setYaw(yaw)
         self._typed.replace(state, changed)
+
+    def follows_heatmap(self, state: Any) -> bool:
+        """Return whether the heading of a state is about that of the heat map, or none is known."""
+        return self._headings is None or self._headings.are_followed(*self.read_pose(state))
 
 
 class CompoundStateAccess:
@@ -154,6 +165,10 @@ class CompoundStateAccess:
         changed = self._typed.readable(state)
         self._first.write_pose(changed[0], x, y, yaw)
         self._typed.replace(state, changed)
+
+    def follows_heatmap(self, state: Any) -> bool:
+        """Return whether the first part does."""
+        return self._first.follows_heatmap(self._typed.readable(state)[0])
 
 
 def state_access(space: Any, headings: HeadingSampler | None = None) -> StateAccess:

@@ -1,4 +1,4 @@
-"""Straight motions of a shape, compiled: the same answers as in Python, many times sooner.
+"""Exact tests of a shape, compiled: the same answers as in Python, many times sooner.
 
 The algorithm is that of :mod:`.shape_checker`, which explains it; the tests hold the two together.
 """
@@ -15,10 +15,8 @@ from .clearance_tables import BLOCKED, CLEAR, STEP, UNKNOWN
 TURN = 2 * pi
 
 # Given, so that whole numbers among the coordinates lead to no second compilation.
-_SIGNATURE = (
-    "int64(float64, float64, float64, float64, float64, float64, uint8[:, ::1], int64[::1],"
-    "uint16[:, ::1], float64[:, ::1], int64[::1], float64[:, ::1])"
-)
+_SHAPE = "uint16[:, ::1], float64[:, ::1], int64[::1], float64[:, ::1])"
+_TABLES = "uint8[:, ::1], int64[::1]," + _SHAPE
 
 # Most parts of a motion that are left to the exact test one by one; beyond that all of it is.
 _MOST_GAPS = 32
@@ -80,6 +78,27 @@ def _region_is_free(  # noqa: C901 - one loop on purpose
 
 
 @compiled
+def _pose_at(motion: Any, arcs: Any, t: float) -> tuple[float, float, float]:
+    """Return the pose of a motion, of which there are arcs unless it is straight."""
+    u, v, heading, du, dv, turn = motion
+    if arcs[0] == 0.0:
+        return u + t * du, v + t * dv, heading + t * turn
+    left = t * arcs[1]
+    for arc in range(int(arcs[0])):
+        length, curvature = arcs[2 + 2 * arc], arcs[3 + 2 * arc]
+        step = min(left, abs(length))
+        left -= step
+        chord = step if length > 0 else -step
+        half = chord * curvature / 2
+        if half != 0.0:
+            chord *= sin(half) / half
+        u += chord * cos(heading + half)
+        v += chord * sin(heading + half)
+        heading += 2 * half
+    return u, v, heading % TURN
+
+
+@compiled
 def _swept_is_free(
     motion: Any,
     low: float,
@@ -90,15 +109,15 @@ def _swept_is_free(
     starts: Any,
     scratch: Any,
 ) -> bool:
-    u, v, heading, du, dv, turn = motion
-    xs, ys = scratch[2], scratch[3]
+    xs, ys, arcs = scratch[2], scratch[3], scratch[9]
     for part in range(len(starts) - 1):
         count = 0
         for t in (low, high):
-            c, s = cos(heading + t * turn), sin(heading + t * turn)
+            u, v, heading = _pose_at(motion, arcs, t)
+            c, s = (cos(heading), sin(heading)) if scratch[8, 8] != 0.0 else (1.0, 0.0)
             for index in range(starts[part], starts[part + 1]):
                 x, y = parts[index, 0], parts[index, 1]
-                new_x, new_y = u + t * du + c * x - s * y, v + t * dv + s * x + c * y
+                new_x, new_y = u + c * x - s * y, v + s * x + c * y
                 # Sorted by row, then column.
                 place = count
                 while place > 0 and (
@@ -114,8 +133,14 @@ def _swept_is_free(
 
 
 @compiled
-def _excess(radius: float, diameter: float, angle: float) -> float:
-    return diameter * angle / 4 + 3 * radius * angle * angle / 6
+def _test_of(motion: Any, width: float, scratch: Any) -> tuple[float, float]:
+    """Return the margin of the test of a piece, and how much farther than the shape it looks."""
+    radius, diameter, rounding = scratch[8, 0], scratch[8, 1], scratch[8, 6]
+    if scratch[9, 0] > 0.0:  # a curve, tested around the middle of the piece
+        return motion[3] * width / 2 + rounding, motion[3] * width / 2**0.5
+    angle = abs(motion[5]) * width
+    margin = radius * angle * angle / 6
+    return margin + rounding, diameter * angle / 4 + 3 * margin
 
 
 @compiled
@@ -129,20 +154,20 @@ def _gap_is_free(
     scratch: Any,
     constants: Any,
 ) -> bool:
-    radius, diameter, worth_a_test = constants[0], constants[1], constants[4]
-    conservatism, rounding = constants[5], constants[6]
-    turn = abs(motion[5])
+    worth_a_test, conservatism = constants[4], constants[5]
     at, width = low, 1.0
-    while width / 2 >= high - low and _excess(radius, diameter, turn * width) > conservatism:
+    while width / 2 >= high - low and _test_of(motion, width, scratch)[1] > conservatism:
         width /= 2
     while at < high:
-        excess, index = _excess(radius, diameter, turn * width), at // width
-        margin = radius * (turn * width) ** 2 / 6 + rounding
+        margin, excess = _test_of(motion, width, scratch)
+        index = at // width
         start, end = index * width, (index + 1) * width
+        if scratch[9, 0] > 0.0:
+            start = end = (start + end) / 2
         if excess <= worth_a_test and _swept_is_free(
             motion, start, end, margin, runs, parts, starts, scratch
         ):
-            at = end
+            at = (index + 1) * width
             if index % 2 and width < 1:
                 width *= 2
         elif excess <= conservatism:
@@ -163,7 +188,7 @@ def _motion_is_free(  # noqa: C901 - one loop on purpose
     scratch: Any,
     constants: Any,
 ) -> int:
-    u, v, heading, du, dv, turn = motion
+    _, _, _, du, dv, turn = motion
     height, width = runs.shape
     ranges = len(counts) // 5
     wanted = gaps = 0
@@ -173,7 +198,7 @@ def _motion_is_free(  # noqa: C901 - one loop on purpose
         per_value, look = STEP / movement, constants[3] / movement
     done, end, t = 0.0, 1.0, 1.0
     while True:
-        at_u, at_v, at = u + t * du, v + t * dv, heading + t * turn
+        at_u, at_v, at = _pose_at(motion, scratch[9], t)
         if not (0 <= at_u < width and 0 <= at_v < height and at >= 0):
             return wanted
         index = int(at * constants[2])
@@ -209,7 +234,7 @@ def _motion_is_free(  # noqa: C901 - one loop on purpose
     return wanted + 1
 
 
-@partial(compiled, signature=_SIGNATURE)
+@partial(compiled, signature=f"int64({6 * 'float64,'} {_TABLES}")
 def straight_is_free(
     x0: float,
     y0: float,
@@ -239,8 +264,9 @@ def straight_is_free(
         runs: (H, W), free pixels to the right of each, itself included.
         parts: (N, 2), the vertices of all convex parts.
         starts: where in ``parts`` each part begins, and the end.
-        scratch: (9, M), M at least 32, twice the vertices of a part and the rows of the map. The
-            last row holds, as from ``ShapeChecker``: radius, diameter, ranges per radian, least
+        scratch: (10, M), M at least 32, twice the vertices of a part and the rows of the map. The
+            last row is for the arcs of a curve, and the row before holds, as from
+            ``ShapeChecker``: radius, diameter, ranges per radian, least
             step, worth a test, conservatism, rounding, after how many uses a table is wanted,
             whether the shape turns, sign and phase of headings, and the six numbers from world to
             pixels.
@@ -261,4 +287,64 @@ def straight_is_free(
             turn = (turn + pi) % TURN - pi
         turn *= constants[9]
     motion = (u, v, heading, du, dv, turn)
+    scratch[9, 0] = 0.0
     return _motion_is_free(motion, tables, counts, runs, parts, starts, scratch, constants)
+
+
+@partial(compiled, signature=f"boolean({4 * 'float64,'} {_SHAPE}")
+def pose_is_free(
+    u: float,
+    v: float,
+    heading: float,
+    margin: float,
+    runs: Any,
+    parts: Any,
+    starts: Any,
+    scratch: Any,
+) -> bool:
+    """Return whether a shape with a margin around it touches nothing at a pose.
+
+    Args:
+        u: of the pose, pixels.
+        v: of the pose, pixels.
+        heading: of the pose, in the frame of the pixels.
+        margin: added around, pixels.
+        runs: see :func:`straight_is_free`, as for those that follow.
+        parts: see there.
+        starts: see there.
+        scratch: see there.
+    """
+    motion = (u, v, heading, 0.0, 0.0, 0.0)
+    scratch[9, 0] = 0.0
+    return _swept_is_free(motion, 0.0, 0.0, margin, runs, parts, starts, scratch)
+
+
+@partial(compiled, signature=f"int64({4 * 'float64,'} {_TABLES}")
+def curve_is_free(
+    u: float,
+    v: float,
+    heading: float,
+    movement: float,
+    tables: Any,
+    counts: Any,
+    runs: Any,
+    parts: Any,
+    starts: Any,
+    scratch: Any,
+) -> int:
+    """Return the same as :func:`straight_is_free` for a curve whose arcs are in ``scratch``.
+
+    Args:
+        u: where it begins, pixels.
+        v: where it begins, pixels.
+        heading: where it begins, in the frame of the pixels.
+        movement: how far any point of the shape moves over all of it, at most; pixels.
+        tables: see :func:`straight_is_free`, as for those that follow.
+        counts: see there.
+        runs: see there.
+        parts: see there.
+        starts: see there.
+        scratch: its last row as from :func:`.compiled_curves.find_curve`.
+    """
+    motion = (u, v, heading, movement, 0.0, 0.0)
+    return _motion_is_free(motion, tables, counts, runs, parts, starts, scratch, scratch[8])

@@ -31,6 +31,9 @@ _COMPILED_USES = 500.0
 # not hide it: a margin of the shape, in pixels. Points have none, see `region_is_free`.
 _ROUNDING = 1e-9
 
+# Where a motion is looked at first, as fractions of it: at its end, where motions often fail.
+_FIRST_LOOKS = (0.5, 1.0)
+
 # Least movement between two looks at a motion where the tables do not know, in pixels.
 _LOOK = 1.0
 
@@ -68,7 +71,8 @@ class ShapeChecker:
         self._parts = [part.tolist() for part in self.shape.parts]
         self._rounding = 0.0 if len(self._parts[0]) == 1 else _ROUNDING
         self._per_radian = self.tables.count / _TURN
-        self._compiled: Callable[..., int] | None = None
+        self._compiled: Any = None
+        self._find_curve: Callable[..., bool] | None = None
         self._buffers: tuple[Any, ...] = ()
         self._clearance = ShapeClearance(grid.free, self.shape)
 
@@ -86,30 +90,29 @@ class ShapeChecker:
         _KEPT.append(checker)
         return checker
 
-    def compile(self) -> None:
-        """Compile the check of straight motions. Answers do not change.
+    def compile(self, curves: bool = False) -> None:
+        """Compile the checks. Answers do not change.
 
         The first time takes seconds; the result is kept on disk, and later processes load it.
+
+        Args:
+            curves: whether Dubins and Reeds-Shepp curves are to be checked as well.
         """
         if self._compiled is None:
-            from .compiled import straight_is_free
+            from . import compiled
 
-            self._buffers = self._make_buffers()
-            self._compiled = straight_is_free
+            self._buffers, self._compiled = self._make_buffers(), compiled
+        if curves:
+            from .compiled_curves import find_curve
+
+            self._find_curve = find_curve
 
     def pose_is_free(self, x: float, y: float, yaw: float) -> bool:
         """Return whether the robot at a pose touches nothing; world coordinates."""
         a, b, c, d, e, f = self._affine
         u, v = a * x + b * y + c, d * x + e * y + f
         heading = (self.shape.sign * yaw + self.shape.phase) % _TURN
-        # Comparisons that NaN fails.
-        if not (0 <= u < self._runs.width and 0 <= v < self._runs.height and heading >= 0):
-            return False
-        index = int(heading * self._per_radian)
-        cell = int(v) * self._runs.width + int(u)
-        value = self.tables.by_heading[index][cell]
-        if value == UNKNOWN and self.tables.refine(index):
-            value = self.tables.by_heading[index][cell]
+        value = self._value_at((u, v, heading))
         if value == UNKNOWN:
             return self._swept_is_free((u, v, heading), None, self._rounding)
         return value != BLOCKED
@@ -123,10 +126,8 @@ class ShapeChecker:
         OMPL's SE2StateSpace.
         """
         if self._compiled is not None:
-            answer = self._compiled(x0, y0, yaw0, x1, y1, yaw1, *self._buffers)
-            if answer > 1:
-                self.tables.make(answer // 2 - 1)
-            return answer & 1 == 1
+            motion = x0, y0, yaw0, x1, y1, yaw1
+            return self._answer(self._compiled.straight_is_free(*motion, *self._buffers))
         a, b, c, d, e, f = self._affine
         u, v = a * x0 + b * y0 + c, d * x0 + e * y0 + f
         du, dv = a * (x1 - x0) + b * (y1 - y0), d * (x1 - x0) + e * (y1 - y0)
@@ -151,7 +152,11 @@ class ShapeChecker:
         return all(self._straight_gap_is_free(pose_at, abs(turn), *gap) for gap in gaps)
 
     def curve_is_free(
-        self, world_pose_at: Callable[[float], Pose], length: float, turn: float
+        self,
+        world_pose_at: Callable[[float], Pose],
+        length: float,
+        turn: float,
+        reverses: bool | None = None,
     ) -> bool:
         """Return whether the robot touches nothing on a curve.
 
@@ -160,6 +165,7 @@ class ShapeChecker:
                 move faster than evenly along ``length``, nor turn faster than evenly by ``turn``.
             length: of the way of the reference point, world units.
             turn: by which the heading changes at most, in all, radians.
+            reverses: whether it is a Reeds-Shepp curve, not a Dubins curve; None if neither.
         """
         a, b, c, d, e, f = self._affine
         sign, phase = self.shape.sign, self.shape.phase
@@ -169,9 +175,15 @@ class ShapeChecker:
             heading = (sign * yaw + phase) % _TURN
             return a * x + b * y + c, d * x + e * y + f, heading
 
-        if not self.shape.turns:
-            turn = 0.0
-        movement = length / self.grid.resolution + self.shape.radius * turn
+        pixels = length / self.grid.resolution
+        movement = pixels + self.shape.radius * (turn if self.shape.turns else 0.0)
+        if self._find_curve is not None and reverses is not None and turn > 0:
+            ends = pose_at(0.0), pose_at(0.5), pose_at(1.0)
+            poses = (*ends[0], *ends[1], *ends[2])
+            arcs = self._buffers[-1][9]
+            if self._find_curve(*poses, pixels, pixels / turn, reverses, arcs):
+                motion = *ends[0], movement
+                return self._answer(self._compiled.curve_is_free(*motion, *self._buffers))
         gaps = self._march(pose_at, movement)
         if gaps is None:
             return False
@@ -190,6 +202,12 @@ class ShapeChecker:
         heading = self.shape.sign * yaw + self.shape.phase
         return self._clearance(u, v, heading) * self.grid.resolution
 
+    def _answer(self, answer: int) -> bool:
+        """Return the answer of a compiled check, and make the table that it asks for."""
+        if answer > 1:
+            self.tables.make(answer // 2 - 1)
+        return answer & 1 == 1
+
     def _make_buffers(self) -> tuple[Any, ...]:
         """Return all arguments of the compiled check but the motion."""
         shape, tables = self.shape, self.tables
@@ -202,7 +220,7 @@ class ShapeChecker:
             *(self._rounding, _COMPILED_USES, float(shape.turns), shape.sign, shape.phase),
             *self._affine,
         )
-        scratch = np.zeros((9, max(32, height + 2, 2 * max(counts))))
+        scratch = np.zeros((10, max(32, height + 2, 2 * max(counts))))
         scratch[8, : len(constants)] = constants
         starts = np.cumsum([0, *counts])
         return tables.stack, tables.counts, runs, np.concatenate(shape.parts), starts, scratch
@@ -218,30 +236,25 @@ class ShapeChecker:
             pose_at: the motion, over 0 to 1.
             movement: how far any point of the shape moves over all of it, at most; pixels.
         """
-        by_heading, refine = self.tables.by_heading, self.tables.refine
-        per_radian, (_, width, height) = self._per_radian, self._runs
         # As a fraction of the motion: how much a unit of the tables clears, and the least step.
         per_value, look = (STEP / movement, _LOOK / movement) if movement else (2.0, 2.0)
-        gaps: list[tuple[float, float]] = []
-        # The motion is known to be free up to `done` and from `end` on.
-        done, end, t = 0.0, 1.0, 1.0
-        while True:
-            u, v, heading = pose_at(t)
-            if not (0 <= u < width and 0 <= v < height and heading >= 0):
-                return None
-            index = int(heading * per_radian)
-            value = by_heading[index][int(v) * width + int(u)]
-            if value == UNKNOWN and refine(index):
-                value = by_heading[index][int(v) * width + int(u)]
+        # Most motions that collide do so at one of these places, the last of which is the end.
+        value = UNKNOWN
+        for t in _FIRST_LOOKS:
+            value = self._value_at(pose_at(t))
             if value == BLOCKED:
                 return None
-            # Over the reach the shape keeps a unit of the tables away from obstacles.
-            reach = (value - CLEAR) * per_value
-            if t == 1.0:
-                # The end is looked at first, since motions often fail there.
-                end, t = (1.0 - reach if value > CLEAR else 1.0), 0.0
-                continue
+        gaps: list[tuple[float, float]] = []
+        # Over its reach the shape keeps a unit of the tables away from obstacles. The motion is
+        # known to be free up to `done` and from `end` on.
+        end = 1.0 - max(0, value - CLEAR) * per_value
+        done = t = 0.0
+        while True:
+            value = self._value_at(pose_at(t))
+            if value == BLOCKED:
+                return None
             if value > CLEAR:
+                reach = (value - CLEAR) * per_value
                 if t - reach > done:
                     gaps.append((done, t - reach))
                 done = t = t + reach
@@ -251,6 +264,19 @@ class ShapeChecker:
                 if done < end:
                     gaps.append((done, end))
                 return gaps
+
+    def _value_at(self, pose: Pose) -> int:
+        """Return what the tables know of a pose; outside of the map it is blocked."""
+        u, v, heading = pose
+        _, width, height = self._runs
+        if not (0 <= u < width and 0 <= v < height and heading >= 0):
+            return BLOCKED
+        index = int(heading * self._per_radian)
+        cell = int(v) * width + int(u)
+        value = self.tables.by_heading[index][cell]
+        if value == UNKNOWN and self.tables.refine(index):
+            value = self.tables.by_heading[index][cell]
+        return value
 
     def _straight_gap_is_free(self, pose_at: PoseAt, turn: float, low: float, high: float) -> bool:
         """Return whether a part of a straight motion is free; the whole turns by ``turn``."""
@@ -293,6 +319,8 @@ class ShapeChecker:
             end: another, or None.
             margin: added around, pixels.
         """
+        if end is None and self._compiled is not None:
+            return bool(self._compiled.pose_is_free(*start, margin, *self._buffers[2:]))
         poses = (start,) if end is None else (start, end)
         turned = [(u, v, cos(heading), sin(heading)) for u, v, heading in poses]
         if not self.shape.turns:

@@ -2,8 +2,9 @@
 
 1. Connectivity. Where the region connects start and goal, all samples of the planner are ours.
    Where it does not, six of seven are left to OMPL's own sampler.
-2. Coverage. Before the first path no learned sample goes where the tree already is. Once the tree
-   has filled the region without a path, our samples are uniform.
+2. Coverage. Before the first path no learned sample goes where the tree already is, with about
+   the heading of the heat map where states have one. Once the tree has filled the region without a
+   path, our samples are uniform.
 3. Stagnation. Before the first path our fraction of the samples halves with every 128 learned
    samples that bring the tree into no new part of the region, down to a quarter. A node in a new
    part restores it.
@@ -78,19 +79,21 @@ class AdaptiveMixture:
             self._watches = self._is_watching = False
             self.covered = None
 
-    def on_new_node(self, x: float, y: float, in_goal: bool) -> None:
+    def on_new_node(self, x: float, y: float, in_goal: bool, covers: bool = True) -> None:
         """Note that the tree has a new node.
 
         Args:
             x: of the node, world.
             y: of the node, world.
             in_goal: whether the node is in the goal region.
+            covers: whether the tree is there by it; with another heading than that of the heat map
+                it may not get on from there.
         """
         if not self._is_watching:
             return
         if self._is_in_goal and not in_goal:
             self.restart()  # a planner that ends with its first path has begun anew
-        pixel = self._tree.add(x, y)
+        pixel = self._tree.add(x, y, covers)
         if pixel is not None and self._region[pixel]:
             self._samples_in_vain = 0
             self._set_fraction(self._most)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import floor, isnan, nan, pi
+from math import floor, inf, isnan, nan, pi
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,6 +22,9 @@ _LEAST_VALUE = 0.02
 
 # Headings that are sampled at a time.
 _BATCH = 512
+
+# How far a heading may deviate from that of the heat map and still follow it, radians.
+_FOLLOWING = 0.6
 
 
 def check_headings(heading: ArrayLike, grid: GridMap) -> NDArray[np.float32]:
@@ -156,7 +159,8 @@ class HeadingSampler:
         reverses: bool = False,
     ) -> None:
         grid = heatmap.grid
-        self._headings = None if heatmap.heading is None else heatmap.heading.reshape(-1).data
+        known = None if options.uniform_fraction == 1 else heatmap.heading
+        self._headings = None if known is None else known.reshape(-1).data
         self._affine = tuple(grid.pixel_from_world)
         self._width, self._height = grid.width, grid.height
         self._options, self._rng, self._reverses = options, rng, reverses
@@ -174,6 +178,18 @@ class HeadingSampler:
         deviation, uniform = self._pending.pop()
         heading = self._known(x, y)
         return uniform if isnan(heading) else (heading + deviation + pi) % (2 * pi) - pi
+
+    def are_followed(self, x: float, y: float, yaw: float) -> bool:
+        """Return whether a pose has about the heading of the heat map, or none is known there.
+
+        Args:
+            x: of the pose, world.
+            y: of the pose, world.
+            yaw: of the pose, radians. A robot that drives backwards may be turned by pi.
+        """
+        # NaN fails the comparison.
+        deviation = abs((yaw - self._known(x, y) + pi) % (2 * pi) - pi)
+        return not (_FOLLOWING < deviation < (pi - _FOLLOWING if self._reverses else inf))
 
     def _refill(self) -> None:
         # What is sampled around 0 may be added to any heading.

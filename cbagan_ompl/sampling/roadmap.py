@@ -33,15 +33,16 @@ class RoadmapMixture:
     def on_start(self, connected: bool) -> None:
         """Do nothing: whether the region is connected does not matter to a roadmap."""
 
-    def on_new_node(self, x: float, y: float, in_goal: bool) -> None:
+    def on_new_node(self, x: float, y: float, in_goal: bool, covers: bool = True) -> None:
         """Note a valid sample.
 
         Args:
             x: of the sample, world.
             y: of the sample, world.
             in_goal: whether it is in the goal, which does not matter here.
+            covers: whether it does instead of another sample there.
         """
-        self._coverage.add(x, y)
+        self._coverage.add(x, y, covers)
 
     def on_sample(self) -> None:
         """Do nothing: valid samples count, see :meth:`on_new_node`."""

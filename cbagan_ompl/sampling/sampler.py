@@ -136,16 +136,17 @@ class HeatmapSampler:
         if self._budget is not None:
             self._budget.restart()
 
-    def on_new_node(self, x: float, y: float, in_goal: bool) -> None:
+    def on_new_node(self, x: float, y: float, in_goal: bool, covers: bool = True) -> None:
         """Note that the planner's tree has a new node.
 
         Args:
             x: of the node, world.
             y: of the node, world.
             in_goal: whether the node is in the goal.
+            covers: whether it does instead of a sample there, which its heading may not do.
         """
         if self._mixture is not None:
-            self._mixture.on_new_node(x, y, in_goal)
+            self._mixture.on_new_node(x, y, in_goal, covers)
 
     def next(self) -> tuple[float, float]:
         """Return the next sample, (x, y), world."""

@@ -32,17 +32,21 @@ class TreeCoverage:
         self._pixels = np.frombuffer(self.mask, np.uint8).reshape(grid.shape)
         self._clearance, self._farthest = grid.clearance, reach / grid.resolution
 
-    def add(self, x: float, y: float) -> int | None:
-        """Cover the square around a node.
+    def add(self, x: float, y: float, covers: bool = True) -> int | None:
+        """Count a node, and cover the square around it.
 
         Args:
             x: of the node, world.
             y: of the node, world.
+            covers: whether it covers anything.
 
         Returns:
-            The row-major number of its pixel; None where it was covered already, or lies outside.
+            The row-major number of its pixel; None if it does not cover it, because it was covered
+            already, or lies outside.
         """
         self.node_count += 1
+        if not covers:
+            return None
         u, v = self._pixel_of(x, y)
         if not (0 <= u < self._width and 0 <= v < self._height):
             return None

@@ -260,3 +260,43 @@ def test_other_compound_spaces_are_refused(two_walls: GridMap, corridor: Heatmap
     space.addSubspace(bounds(ob.SE2StateSpace(), two_walls), 1.0)
     with pytest.raises(PlannerError, match="first part"):
         HeatmapStateSampler(space, corridor)
+
+
+class _OneWay(ob.StateValidityChecker):  # type: ignore[misc]
+    """Poses are valid whose yaw is positive."""
+
+    def __init__(self, si: Any, counts: list[bool]) -> None:
+        super().__init__(si)
+        self._counts = counts
+        self._read = state_access(si.getStateSpace()).read_pose
+
+    def isValid(self, state: Any) -> bool:  # noqa: N802
+        valid = self._read(state)[2] > 0
+        self._counts.append(valid)
+        return valid
+
+
+@pytest.mark.parametrize("kind", SPACES)
+def test_a_sample_in_collision_gets_another_heading(two_walls: GridMap, kind: str) -> None:
+    space = make_space(kind, two_walls)
+    setup = og.SimpleSetup(space)
+    si = setup.getSpaceInformation()
+    counts: list[bool] = []
+    setup.setStateValidityChecker(_OneWay(si, counts))
+    access = state_access(space)
+    ends = [compat.new_state(space) for _ in range(2)]
+    for end, place in zip(ends, (START, GOAL), strict=True):
+        access.write_pose(compat.typed_state(end), *place, 1.0)
+    setup.setStartAndGoalStates(*ends, 0.01)
+    setup.setPlanner(og.RRTstar(si))
+    heading = HeadingSpread(uniform_fraction=1, approach_fraction=0)
+    with attach(setup, Heatmap.uniform(two_walls), seed=0, heading=heading):
+        goal = setup.getGoal()
+        state = compat.new_state(space)
+        yaws = []
+        for _ in range(400):
+            goal._sample_heatmap(compat.typed_state(state))
+            yaws.append(access.read_pose(compat.typed_state(state))[2])
+    # With four headings each, a sixteenth of the samples stays invalid.
+    assert np.mean(np.array(yaws) <= 0) == pytest.approx(1 / 16, abs=0.04)
+    assert 1.5 < len(counts) / 400 < 2.1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from math import inf, nan, pi
 
 import numpy as np
@@ -45,6 +46,13 @@ def scaled(robot: Robot, resolution: float) -> Robot:
 def random_poses(grid: GridMap, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
     pixels = rng.uniform((0, 0), (grid.width, grid.height), (count, 2))
     return np.column_stack((grid.to_world(pixels), rng.uniform(-pi, pi, count)))
+
+
+def pose_between(
+    start: NDArray[np.float64], end: NDArray[np.float64], t: float
+) -> tuple[float, float, float]:
+    x, y, yaw = (start + t * (end - start)).tolist()
+    return x, y, yaw
 
 
 @pytest.mark.parametrize("ros", [False, True])
@@ -132,6 +140,12 @@ def test_the_compiled_check_gives_the_same_answers(name: str, ros: bool) -> None
         assert type(answer) is bool
         assert answer == plain.straight_is_free(*motion)
         answers.add(answer)
+        free = compiled.pose_is_free(*end.tolist())
+        assert type(free) is bool
+        assert free == plain.pose_is_free(*end.tolist())
+        length, turn = float(np.hypot(*(end - start)[:2])), float(abs(end - start)[2])
+        curve = partial(pose_between, start, end), length, turn
+        assert compiled.curve_is_free(*curve) == plain.curve_is_free(*curve)
     assert answers == {True, False}
     for value in (nan, inf):
         for place in range(6):

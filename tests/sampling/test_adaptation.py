@@ -47,7 +47,9 @@ def test_a_node_covers_no_more_than_its_clearance(two_walls: GridMap) -> None:
     assert covers(184.5, 126.5)
     assert not covers(180.0, 110.0), "farther than the reach"
     assert tree.add(-3.0, 500.0) is None
-    assert tree.node_count == 4
+    assert tree.add(30.0, 200.0, covers=False) is None
+    assert not covers(30.0, 200.0)
+    assert tree.node_count == 5
     tree.clear()
     assert not covers(100.0, 53.0)
 
@@ -122,6 +124,19 @@ def test_a_region_that_connects_nothing_is_sampled_less(corridor: Heatmap) -> No
             for _ in range(1000):
                 mixture.on_sample()
             assert fractions[-1] == fraction, "nothing was watched that could change it"
+
+
+def test_a_node_that_is_turned_elsewhere_does_not_count_as_new_ground(corridor: Heatmap) -> None:
+    mixture, fractions = make_mixture(corridor)
+    for _ in range(1000):
+        mixture.on_sample()
+    row, column = np.argwhere(corridor.region)[0]
+    mixture.on_new_node(column + 0.5, row + 0.5, in_goal=False, covers=False)
+    assert fractions[-1] == 0.25
+    assert not any(mixture.covered)
+    mixture.on_new_node(column + 0.5, row + 0.5, in_goal=False)
+    assert fractions[-1] == 1.0
+    assert any(mixture.covered)
 
 
 def test_a_cleared_tree_is_noticed(corridor: Heatmap) -> None:

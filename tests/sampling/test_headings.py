@@ -126,6 +126,29 @@ def test_headings_stay_below_pi() -> None:
         assert -pi <= one < pi
 
 
+@pytest.mark.parametrize("heading", [-3.0, 0.0, 3.1])
+def test_which_poses_follow_the_headings(heading: float) -> None:
+    known = np.full(FREE.shape, heading)
+    known[:, 40:] = nan
+    heatmap = Heatmap(FREE, GridMap(FREE), known)
+    forwards, both = (
+        HeadingSampler(heatmap, HeadingSpread(), np.random.default_rng(0), reverses)
+        for reverses in (False, True)
+    )
+    for turn in (-0.5, 0.0, 0.5, 2 * pi):
+        assert forwards.are_followed(5.0, 5.0, heading + turn)
+        assert both.are_followed(5.0, 5.0, heading + turn)
+        assert not forwards.are_followed(5.0, 5.0, heading + pi + turn)
+        assert both.are_followed(5.0, 5.0, heading + pi + turn)
+    for turn in (-pi / 2, 1.0, 2.2):
+        assert not forwards.are_followed(5.0, 5.0, heading + turn)
+        assert not both.are_followed(5.0, 5.0, heading + turn)
+        assert forwards.are_followed(50.0, 5.0, heading + turn), "where nothing is known"
+        assert forwards.are_followed(-50.0, 5.0, heading + turn), "off the map"
+        off = HeadingSampler(heatmap, HeadingSpread(uniform_fraction=1), np.random.default_rng(0))
+        assert off.are_followed(5.0, 5.0, heading + turn)
+
+
 def test_reversals() -> None:
     spread = HeadingSpread(spread=0.1, uniform_fraction=0.1, reverse_fraction=0.3)
     rng = np.random.default_rng(3)
