@@ -19,6 +19,7 @@ from inference_speed import speed_table as speed_of_models
 from planner_tables import Json, ratios_table
 from robot_tables import car_suites, robot_paths
 from search_speed import speed_table
+from study_tables import control, overlap
 from suite_tables import (
     ROOT,
     VERSIONS,
@@ -154,18 +155,37 @@ def sharpness() -> str:
 
 
 def ablation() -> str:
-    results = read("worlds_ablation.json")
-    names = {
-        "full": "the whole",
-        "supervised": "without the adversarial part",
-        "no-fronts": "without the distance fields",
-    }
-    tests = {name: results[key]["test"] for key, name in names.items()}
-    rows = [
-        [name, f"{scores['iou']:.3f}", f"{scores['dice']:.3f}", connected(scores)]
-        for name, scores in tests.items()
-    ]
-    return table(["network", "IoU", "Dice", "connected (8)"], rows)
+    variants = read("ablation.json")["variants"]
+    rows = []
+    for name, scores in variants.items():
+        runs = scores["seeds"]
+        dice = sum(run["dice"] for run in runs) / len(runs)
+        least = min(run["connectivity"] for run in runs)
+        difference = spread(scores["difference"], "+.4f") if "difference" in scores else "-"
+        ious = spread(scores["iou"], ".4f")
+        rows.append([name, len(runs), ious, difference, f"{dice:.4f}", f"{100 * least:.1f} %"])
+    header = ["network", "seeds", "IoU", "difference from the whole", "Dice"]
+    return table([*header, "connected (8), least"], rows)
+
+
+def spread(interval: list[float], form: str) -> str:
+    mean, low, high = interval
+    return f"{mean:{form}} ({low:{form}} to {high:{form}})"
+
+
+def refinement() -> str:
+    rows = []
+    for row in read("refinement.json")["maps"]:
+        for model, result in row["scores"].items():
+            values = result["scores"] | {"intervals": result["intervals"]}
+            cells = [bracketed(values, name) for name in ("iou", "dice", "connectivity")]
+            rows.append([row["map"], model.replace("refined-", "refined, seed "), *cells])
+    return table(["map", "model", "IoU", "Dice", "connected (8)"], rows)
+
+
+def bracketed(values: Json, name: str) -> str:
+    low, high = values["intervals"][name]
+    return f"{values[name]:.3f} [{low:.3f}, {high:.3f}]"
 
 
 def generated_maps() -> str:
@@ -324,6 +344,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "labels": labels,
     "generated_maps": generated_maps,
     "ablation": ablation,
+    "refinement": refinement,
     "regions": regions,
     "label_noise": label_noise,
     "networks": networks,
@@ -334,6 +355,8 @@ TABLES: dict[str, Callable[[], str]] = {
     "inference_speed": lambda: speed_of_models(read("inference_speed.json")),
     "robot_paths": robot_paths,
     "car_suites": car_suites,
+    "control": control,
+    "overlap": overlap,
     "search_speed": lambda: speed_table(read("search_speed.json")),
 }
 

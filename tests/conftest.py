@@ -2,8 +2,10 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 # Before torch is loaded: on small tensors several threads mostly wait for each other, and on a
 # busy machine for minutes.
@@ -45,7 +47,21 @@ def finished(map_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Fini
 
 @pytest.fixture
 def interruptible() -> Iterator[None]:
-    """A process that was started in the background ignores SIGINT, and so do its children."""
+    """A process that was started in the background ignores SIGINT, and so do its children.
+
+    An interrupt while coverage notes a file would leave its lock taken, for ever: it pauses.
+    """
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    measured = measured_coverage()
+    if measured is not None:
+        measured.stop()
     yield
+    if measured is not None:
+        measured.start()
     signal.signal(signal.SIGINT, before)
+
+
+def measured_coverage() -> Any:
+    """Return the coverage that is measured in this process, if any."""
+    module = sys.modules.get("coverage")
+    return None if module is None else module.Coverage.current()

@@ -6,11 +6,13 @@ import ast
 import json
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+import yaml
 
 import cbagan_ompl
 from cbagan_ompl import reached_control_planners, reached_planners
@@ -72,6 +74,38 @@ def test_getting_started_runs(tmp_path: Path) -> None:
 # What makes a documented benchmark quick, as options that come after its own.
 QUICK = "--planners RRT --simplify RRT --samplers uniform,corridor --runs 1 --time 0.05"
 QUICK += " --tasks-per-map 1 --jobs 1"
+
+
+# The same for the steps of a training: the first two words of a command, or the first.
+QUICK_STEPS = {
+    "dataset generate": "--maps 4 --tasks 3 --copies 2 --size 64 --jobs 1 --generators clutter",
+    "dataset label": "--tasks 8 --size 64",
+    "train": "--epochs 1 --set batch_size=4",
+    "plan": "--time 0.2 --planner RRT",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [0, 1])
+def test_trainings_run(number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("torch")
+    page = (DOCS / "training.md").read_text(encoding="utf-8")
+    blocks = [block.split("```")[0] for block in page.split("```sh\n")[1:]]
+    commands = [block for block in blocks if "evaluate" in block][number].splitlines()
+    (tmp_path / "examples").symlink_to(DOCS.parent / "examples")
+    map_file = tmp_path / "site.yaml"
+    map_file.write_text((DOCS.parent / "examples/data/office.yaml").read_text())
+    image = yaml.safe_load(map_file.read_text())["image"]
+    shutil.copy(DOCS.parent / "examples" / "data" / image, tmp_path)
+    monkeypatch.chdir(tmp_path)
+    for command in commands:
+        program, *words = shlex.split(command)
+        assert program == "cbagan-ompl"
+        step = " ".join(words[:2]) if words[0] == "dataset" else words[0]
+        quick = shlex.split(QUICK_STEPS.get(step, ""))
+        if step == "train" and "--start-from" not in words:
+            quick += ["widths=[4,4,6,8]", "discriminator_width=4"]
+        assert main([*words, *quick]) == 0, command
 
 
 @pytest.mark.slow

@@ -16,8 +16,8 @@ from typing import Any
 
 from cbagan_ompl.common.files import write_json
 from cbagan_ompl.datasets.dataset import load_dataset
-from cbagan_ompl.training.checkpoints import BEST, LAST, load_checkpoint
-from cbagan_ompl.training.config import TrainingConfig
+from cbagan_ompl.training.checkpoints import load_checkpoint
+from cbagan_ompl.training.config import BEST, LAST, TrainingConfig
 from cbagan_ompl.training.loop import train
 from cbagan_ompl.training.task_sources import DatasetSource
 

@@ -12,6 +12,7 @@ from ..common.validation import require_torch, whole_number
 from ..datasets.dataset import load_dataset
 from ..datasets.synthetic import HARD_DETOUR, TASKS_PER_MAP, SyntheticSettings
 from ..errors import ConfigError
+from ..inference.bundled_models import find_model
 from ..inference.model_files import ModelFormat, is_model
 from ..networks.config import NETWORKS
 from ..training.checkpoint_files import read_checkpoint
@@ -203,7 +204,7 @@ def _train(args: argparse.Namespace) -> int:
     if args.synthetic == (args.dataset is not None):
         raise ConfigError("tasks come from a DATASET or from --synthetic: give one of both")
     if args.start_from is not None:
-        read_checkpoint(Path(args.start_from))
+        _check_weights(find_model(args.start_from))
     require_torch()
     import torch
 
@@ -267,12 +268,17 @@ def _print_scores(result: dict[str, Any]) -> None:
     print(f"export it with: cbagan-ompl export {result['checkpoint']} --output MODEL.pt")
 
 
+def _check_weights(path: Path) -> None:
+    """Raise if a file is damaged: torch, which reads it, takes seconds to load."""
+    if not is_model(path):
+        read_checkpoint(path)
+
+
 def _export(args: argparse.Namespace) -> int:
     if args.format is not None and not args.output.endswith(ModelFormat(args.format).suffix):
         suffix = ModelFormat(args.format).suffix
         raise ConfigError(f"--format {args.format} writes a file whose name ends in {suffix}")
-    if not is_model(Path(args.checkpoint)):
-        read_checkpoint(Path(args.checkpoint))
+    _check_weights(Path(args.checkpoint))
     require_torch()
     from ..training.export import export
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import isfinite
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -37,7 +39,7 @@ def geodesic_label(
         epsilon: relative detour at the border of the region.
 
     Returns:
-        (H, W), from 0 to 1; 0 where a distance is infinite.
+        (H, W), from 0 to 1; 0 where a distance is infinite, and everywhere without a path.
 
     Example:
         >>> from_start = np.array([[0, 1, 2]], np.float32)
@@ -45,6 +47,8 @@ def geodesic_label(
         [[1.0, 1.0, 1.0]]
     """
     shortest = float(from_start[goal[1], goal[0]])
+    if not isfinite(shortest):
+        return np.zeros_like(from_start)
     detour = np.maximum(from_start + from_goal - np.float32(shortest), 0)
     label: NDArray[np.float32] = np.exp2(-detour / np.float32(epsilon * shortest + SLACK))
     return label

@@ -6,9 +6,7 @@ by what the bindings offer, not by version number, so that a build that binds mo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from threading import Lock
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -32,15 +30,21 @@ from ompl import geometric as og  # noqa: E402
 from ompl import tools as ot  # noqa: E402
 from ompl import util as ou  # noqa: E402
 
+from .ompl_log import log_level  # noqa: E402
+
 __all__ = [
     "BINDINGS",
     "BOOST_PYTHON",
     "HAS_STATE_SAMPLER_ALLOCATOR",
+    "log_level",
     "ob",
     "og",
     "ompl_version",
     "ou",
 ]
+
+#: Classes of states whose Python object may be one of another state, kept and out of date.
+KEPT_STATES: Any = () if BOOST_PYTHON else ob.State
 
 #: Whether planners can be given a StateSampler (OMPL 1.7; not bound in 2.0.0 and 2.0.1).
 HAS_STATE_SAMPLER_ALLOCATOR = hasattr(ob.StateSpace, "setStateSamplerAllocator")
@@ -147,7 +151,21 @@ def make_pose_space(
 
 def new_state(space: Any) -> Any:
     """Return a state of the space that lives as long as the returned object."""
-    return ob.State(space) if BOOST_PYTHON else space.allocState()
+    if BOOST_PYTHON:
+        return ob.State(space)
+    mistyped = []  # kept meanwhile, so that the next one lies elsewhere
+    while not isinstance(state := space.allocState(), _state_class(space)):
+        mistyped.append(state)
+    return state
+
+
+def _state_class(space: Any) -> Any:
+    """Return the class of a space's states on nanobind; ``ob.State`` where it is not known."""
+    if isinstance(space, ob.SE2StateSpace):
+        return ob.SE2StateType
+    if isinstance(space, ob.RealVectorStateSpace):
+        return ob.RealVectorStateType
+    return ob.CompoundState if isinstance(space, ob.CompoundStateSpace) else ob.State
 
 
 def best_cost(planner: Any) -> float:
@@ -308,34 +326,3 @@ def seed_ompl(seed: int) -> None:
     """
     with log_level(ou.LOG_NONE):
         ou.RNG.setSeed(seed % (2**32 - 1) + 1)
-
-
-@contextmanager
-def log_level(level: Any) -> Iterator[None]:
-    """Let OMPL's log say no more than a level for the duration of a block.
-
-    The level is one for the whole process. While several blocks are open, in several threads, the
-    quietest of them counts; the last one to end restores what was set before the first one.
-    """
-    with _log_lock:
-        if not _log_levels:
-            _log_levels.append(ou.getLogLevel())
-        _log_levels.append(level)
-        ou.setLogLevel(max(_log_levels, key=_quietness))
-    try:
-        yield
-    finally:
-        with _log_lock:
-            _log_levels.remove(level)
-            ou.setLogLevel(max(_log_levels, key=_quietness))
-            if len(_log_levels) == 1:
-                _log_levels.clear()
-
-
-def _quietness(level: Any) -> int:
-    return int(getattr(level, "value", level))
-
-
-_log_lock = Lock()
-# The level before the first open block, followed by those of the open blocks.
-_log_levels: list[Any] = []

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..sampling.sampler import HeatmapSampler
 from .compat import new_state, ob, typed_state
-from .states import drives_backwards, pose_space
+from .states import drives_backwards, pose_space, state_access
 
 # Lengths of the shortest curves that turn a robot by pi in place, in turning radii.
 _DUBINS_TURN, _REEDS_SHEPP_TURN = 7 * pi / 3, pi
@@ -30,7 +30,7 @@ class GoalApproach:
     """
 
     def __init__(self, space: Any, sampler: HeatmapSampler) -> None:
-        self._is_whole = pose_space(space) is space
+        self._states = state_access(space)
         self._reverses = drives_backwards(space)
         self._radius = turning_radius(space)
         self._grid, self._chance = sampler.heatmap.grid, sampler.chance
@@ -46,17 +46,14 @@ class GoalApproach:
         Args:
             state: of the space, changed in place.
         """
-        pose = state if self._is_whole else state[0]
-        x, y, yaw = pose.getX(), pose.getY(), pose.getYaw()
+        x, y, yaw = self._states.read_pose(state)
         for _ in range(_MOST_TRIES):
             turn = pi * self._radius * self._chance()
             if not (self._reverses and self._chance() < 0.5):
                 turn = -turn
             moved = follow_arc(x, y, yaw, turn, (2 * self._chance() - 1) / self._radius)
             if self._grid.is_free(moved[:2]):
-                pose.setX(moved[0])
-                pose.setY(moved[1])
-                pose.setYaw(moved[2])
+                self._states.write_pose(state, *moved)
                 return
 
 

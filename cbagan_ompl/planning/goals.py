@@ -83,9 +83,8 @@ def reached_goal(
         goals: positions (2,) or poses (3,).
     """
     space = setup.getStateSpace()
-    end = workspace.make_state(
-        space, workspace.read_states(setup.getSolutionPath().getStates())[-1]
-    )
+    states = setup.getSolutionPath().getStates()
+    end = workspace.make_state(space, workspace.read_states(space, states)[-1])
 
     def distance(goal: NDArray[np.float64]) -> float:
         state = workspace.make_state(space, goal)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .compat import new_state, typed_state
+from .states import state_access
 from .workspace import Endpoints, Workspace
 
 # Slack of the check that a path ends in the goal region, for the rounding of a distance.
@@ -29,9 +30,8 @@ def checked_path(
     Returns:
         Positions (N, 2) or poses (N, 3), world.
     """
-    states = setup.getSolutionPath().getStates()
-    path = workspace.read_states(states)
     space = setup.getStateSpace()
+    path = workspace.read_states(space, setup.getSolutionPath().getStates())
     goal = workspace.make_state(space, endpoints[1])
     end = workspace.make_state(space, path[-1])
     at_start = np.array_equal(path[0], endpoints[0])
@@ -76,13 +76,13 @@ def follow_path(
         return divide_segments(path, step)
     space = setup.getStateSpace()
     states = [workspace.make_state(space, endpoint) for endpoint in path]
-    passed = new_state(space)
+    passed, read = new_state(space), state_access(space).read_pose
     points = [path[0]]
     for (start, end), way_point in zip(pairwise(states), path[1:], strict=True):
         count = int(np.ceil(workspace.reach_of_motion(space, start, end) / step))
         for i in range(1, count):
             space.interpolate(typed_state(start), typed_state(end), i / count, typed_state(passed))
-            points.append(workspace.read_states([typed_state(passed)])[0])
+            points.append(np.array(read(typed_state(passed))))
         points.append(way_point)
     return np.array(points)
 

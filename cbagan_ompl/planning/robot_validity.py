@@ -13,7 +13,7 @@ from ..robots.robot import Robot, check_robot
 from ..robots.shape_checker import Pose, ShapeChecker
 from . import compat
 from .compat import ob
-from .states import pose_space, position_space, read_pose, space_of
+from .states import pose_space, space_of, state_access
 from .validity import set_last_valid
 
 
@@ -178,24 +178,13 @@ def pose_reader(space: Any, robot: Robot) -> Callable[[Any], Pose]:
     Raises:
         PlannerError: the states have no pose, or no yaw for a robot that has a heading.
     """
-    part = position_space(space)
-    if part is None:
-        raise PlannerError(
-            "robots are checked in RealVectorStateSpace(2), SE2StateSpace, DubinsStateSpace, "
-            "ReedsSheppStateSpace and compound spaces whose first part is one of them, not in "
-            f"{type(space).__name__} of dimension {space.getDimension()}"
-        )
+    read = state_access(space).read_pose
     if pose_space(space) is None and robot.has_heading:
         raise PlannerError(
             f"a robot with a heading plans in {robot.state_space}, whose states have a yaw, not "
             "in RealVectorStateSpace"
         )
-    read = _read_position if pose_space(space) is None else read_pose
-    return read if part is space else lambda state: read(state[0])
-
-
-def _read_position(state: Any) -> Pose:
-    return state[0], state[1], 0.0
+    return read
 
 
 def _largest_curvature(space: Any) -> float | None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..errors import PlannerError, show
 from ..sampling.headings import HeadingSampler
 from .compat import ob
+from .typed_states import TypedStates
 
 
 class StateAccess(Protocol):
@@ -17,6 +18,9 @@ class StateAccess(Protocol):
 
     def read(self, state: Any) -> tuple[float, float]:
         """Return the (x, y) of a state."""
+
+    def read_pose(self, state: Any) -> tuple[float, float, float]:
+        """Return the (x, y, yaw) of a state; the yaw is 0 where states have none."""
 
     def write(self, state: Any, x: float, y: float) -> None:
         """Set the position of a state to a sample; anything else in the state becomes uniform.
@@ -27,43 +31,87 @@ class StateAccess(Protocol):
             y: of the sample, world.
         """
 
+    def write_pose(self, state: Any, x: float, y: float, yaw: float) -> None:
+        """Set the pose of a state, or the position where states have no yaw.
+
+        Args:
+            state: a state of the space, changed in place.
+            x: of the position, world.
+            y: of the position, world.
+            yaw: radians.
+        """
+
 
 class PlaneStateAccess:
-    """Access to states of a RealVectorStateSpace of dimension 2."""
+    """Access to states of a RealVectorStateSpace of dimension 2.
 
-    @staticmethod
-    def read(state: Any) -> tuple[float, float]:
+    Args:
+        space: the space.
+    """
+
+    def __init__(self, space: Any) -> None:
+        self._typed = TypedStates(space)
+        self._type = self._typed.type
+
+    def read(self, state: Any) -> tuple[float, float]:
         """Return the (x, y) of a state."""
+        if type(state) is not self._type:
+            state = self._typed.readable(state)
         return state[0], state[1]
 
-    @staticmethod
-    def write(state: Any, x: float, y: float) -> None:
+    def read_pose(self, state: Any) -> tuple[float, float, float]:
+        """Return the (x, y) of a state and the yaw 0."""
+        return *self.read(state), 0.0
+
+    def write(self, state: Any, x: float, y: float) -> None:
         """Set (x, y); arguments as for :meth:`StateAccess.write`."""
-        state[0] = x
-        state[1] = y
+        changed = self._typed.readable(state)
+        changed[0] = x
+        changed[1] = y
+        self._typed.replace(state, changed)
+
+    def write_pose(self, state: Any, x: float, y: float, yaw: float) -> None:
+        """Set (x, y); arguments as for :meth:`StateAccess.write_pose`, without a yaw to be set."""
+        self.write(state, x, y)
 
 
 class PoseStateAccess:
     """Access to states of SE2StateSpace, DubinsStateSpace and ReedsSheppStateSpace.
 
     Args:
+        space: the space.
         headings: samples the heading at a position; None for reading alone.
     """
 
-    def __init__(self, headings: HeadingSampler | None) -> None:
+    def __init__(self, space: Any, headings: HeadingSampler | None) -> None:
+        self._typed = TypedStates(space)
+        self._type = self._typed.type
         self._headings = headings
 
-    @staticmethod
-    def read(state: Any) -> tuple[float, float]:
+    def read(self, state: Any) -> tuple[float, float]:
         """Return the (x, y) of a state."""
+        if type(state) is not self._type:
+            state = self._typed.readable(state)
         return state.getX(), state.getY()
+
+    def read_pose(self, state: Any) -> tuple[float, float, float]:
+        """Return the (x, y, yaw) of a state."""
+        if type(state) is not self._type:
+            state = self._typed.readable(state)
+        return state.getX(), state.getY(), state.getYaw()
 
     def write(self, state: Any, x: float, y: float) -> None:
         """Set (x, y) and sample a heading; arguments as for :meth:`StateAccess.write`."""
-        assert self._headings is not None, "this access is for reading"
-        state.setX(x)
-        state.setY(y)
-        state.setYaw(self._headings.sample(x, y))
+        assert self._headings is not None, "this access samples no headings"
+        self.write_pose(state, x, y, self._headings.sample(x, y))
+
+    def write_pose(self, state: Any, x: float, y: float, yaw: float) -> None:
+        """Set the pose; arguments as for :meth:`StateAccess.write_pose`."""
+        changed = self._typed.readable(state)
+        changed.setX(x)
+        changed.setY(y)
+        changed.setYaw(yaw)
+        self._typed.replace(state, changed)
 
 
 class CompoundStateAccess:
@@ -78,6 +126,7 @@ class CompoundStateAccess:
 
     def __init__(self, space: Any, first: StateAccess) -> None:
         self._first = first
+        self._typed = TypedStates(space)
         self._space = space  # keeps the parts alive, which their samplers refer to
         self._others = [
             (part, space.getSubspace(part).allocDefaultStateSampler())
@@ -86,13 +135,25 @@ class CompoundStateAccess:
 
     def read(self, state: Any) -> tuple[float, float]:
         """Return the (x, y) of a state."""
-        return self._first.read(state[0])
+        return self._first.read(self._typed.readable(state)[0])
+
+    def read_pose(self, state: Any) -> tuple[float, float, float]:
+        """Return the (x, y, yaw) of a state."""
+        return self._first.read_pose(self._typed.readable(state)[0])
 
     def write(self, state: Any, x: float, y: float) -> None:
         """Set (x, y), sample everything else; arguments as for :meth:`StateAccess.write`."""
-        self._first.write(state[0], x, y)
+        changed = self._typed.readable(state)
+        self._first.write(changed[0], x, y)
         for part, sampler in self._others:
-            sampler.sampleUniform(state[part])
+            sampler.sampleUniform(changed[part])
+        self._typed.replace(state, changed)
+
+    def write_pose(self, state: Any, x: float, y: float, yaw: float) -> None:
+        """Set the first part alone; arguments as for :meth:`StateAccess.write_pose`."""
+        changed = self._typed.readable(state)
+        self._first.write_pose(changed[0], x, y, yaw)
+        self._typed.replace(state, changed)
 
 
 def state_access(space: Any, headings: HeadingSampler | None = None) -> StateAccess:
@@ -110,18 +171,13 @@ def state_access(space: Any, headings: HeadingSampler | None = None) -> StateAcc
     part = position_space(space)
     if part is None:
         raise PlannerError(
-            "a 2-D heat map serves RealVectorStateSpace(2), SE2StateSpace, DubinsStateSpace, "
+            "a 2-D map serves RealVectorStateSpace(2), SE2StateSpace, DubinsStateSpace, "
             "ReedsSheppStateSpace and compound spaces whose first part is one of them, not "
             f"{type(space).__name__} of dimension {space.getDimension()}"
         )
     has_heading = isinstance(part, ob.SE2StateSpace)
-    access: StateAccess = PoseStateAccess(headings) if has_heading else PlaneStateAccess()
+    access: StateAccess = PoseStateAccess(part, headings) if has_heading else PlaneStateAccess(part)
     return access if part is space else CompoundStateAccess(space, access)
-
-
-def read_pose(state: Any) -> tuple[float, float, float]:
-    """Return the (x, y, yaw) of a state of an SE2StateSpace."""
-    return state.getX(), state.getY(), state.getYaw()
 
 
 def position_space(space: Any) -> Any:

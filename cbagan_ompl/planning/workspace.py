@@ -23,7 +23,7 @@ from ..sampling.heatmap import Heatmap
 from ..sampling.robot_heatmaps import robot_heatmap
 from . import compat
 from .robot_validity import RobotMotionValidator, RobotValidityChecker
-from .states import read_pose
+from .states import state_access
 from .validity import GridMotionValidator, GridValidityChecker
 
 #: Start and goal as from :meth:`Workspace.check_task`: positions (2,) or poses (3,).
@@ -146,15 +146,17 @@ class Workspace:
             values.setYaw(yaw)
         return state
 
-    def read_states(self, states: Any) -> NDArray[np.float64]:
+    def read_states(self, space: Any, states: Any) -> NDArray[np.float64]:
         """Return positions (N, 2) or poses (N, 3) of states, world.
 
         Args:
+            space: from :meth:`make_space`.
             states: a sequence of states of the space.
         """
+        access = state_access(space)
         if self.robot.has_heading:
-            return np.array([read_pose(state) for state in states]).reshape(-1, 3)
-        return np.array([(state[0], state[1]) for state in states]).reshape(-1, 2)
+            return np.array([access.read_pose(state) for state in states]).reshape(-1, 3)
+        return np.array([access.read(state) for state in states]).reshape(-1, 2)
 
     def reach_of_motion(self, space: Any, start: Any, end: Any) -> float:
         """Return how far any point of a robot with heading moves along a motion, world units.
@@ -169,7 +171,7 @@ class Workspace:
         if robot.turning_radius is not None:
             turned = robot.circumscribed_radius / robot.turning_radius
             return float(space.distance(first, last)) * (1 + turned)
-        a, b = self.read_states([first, last])
+        a, b = self.read_states(space, [first, last])
         turn = abs(remainder(b[2] - a[2], tau))
         return float(np.hypot(*(b - a)[:2])) + robot.circumscribed_radius * turn
 

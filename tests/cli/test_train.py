@@ -12,12 +12,16 @@ from helpers.training_set import write_training_set
 
 pytest.importorskip("torch")
 
-from cbagan_ompl import ConfigError, DatasetError, GridMap
+import torch
+
+from cbagan_ompl import ConfigError, DatasetError, GridMap, ModelError
 from cbagan_ompl.cli import main
 from cbagan_ompl.cli.train import add_export_parser, add_train_parser
+from cbagan_ompl.inference.bundled_models import bundled_model
 from cbagan_ompl.inference.predictor import load_model
 from cbagan_ompl.training.checkpoints import load_checkpoint
 from cbagan_ompl.training.export import export
+from cbagan_ompl.training.model_weights import recover_generator
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +40,28 @@ def run(*words: str) -> int:
     parser.set_defaults(force=False)
     args = parser.parse_args(words)
     return int(args.run(args))
+
+
+@pytest.mark.parametrize("start", ["cbagan-worlds", "a file"])
+def test_refining_a_model(
+    start: str, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = str(bundled_model("cbagan-worlds")) if start == "a file" else start
+    words = ["train", str(folder), "--output", str(tmp_path / "run"), "--preset", "refine"]
+    words += ["--start-from", before, "--set", "epochs=1", "batch_size=4", "generator_lr=1e-9"]
+    assert run(*words) == 0
+    refined = load_checkpoint(tmp_path / "run" / "best.pt")["gan"]["average"]
+    weights = recover_generator(bundled_model("cbagan-worlds")).state_dict()
+    assert torch.allclose(refined["head.weight"], weights["head.weight"], atol=1e-6)
+    assert "best epoch" in capsys.readouterr().out
+
+
+def test_refining_what_is_not_there(folder: Path, tmp_path: Path) -> None:
+    words = ["train", str(folder), "--output", str(tmp_path / "run"), "--start-from"]
+    with pytest.raises(ModelError, match="no-such-model"):
+        run(*words, "no-such-model")
+    with pytest.raises(ModelError, match="no such file"):
+        run(*words, str(tmp_path / "missing.pt"))
 
 
 def test_train_and_export_commands(

@@ -70,3 +70,9 @@ def test_directions_lead_along_the_shortest_path() -> None:
     assert (travel_directions(from_goal, np.zeros_like(label)) == 0).all()
     inside = label.reshape(16, 4, 16, 4).mean((1, 3)) > 0.5
     assert (length[inside] > 0).all()
+
+
+def test_a_task_without_a_path_has_no_region() -> None:
+    free = np.ones((8, 9), bool)
+    free[:, 4] = False
+    assert not label_of(free, (1, 1), (7, 6)).any()

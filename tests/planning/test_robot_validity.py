@@ -286,7 +286,7 @@ def test_arguments_that_are_none() -> None:
             kind(poses, grid, Robot.rectangle(400, 2))
         with pytest.raises(PlannerError, match="SE2StateSpace"):
             kind(plane, grid, ROBOTS["rectangle"])
-        with pytest.raises(PlannerError, match="not in SO2StateSpace"):
+        with pytest.raises(PlannerError, match="not SO2StateSpace"):
             kind(angle, grid, ROBOTS["car"])
         with pytest.raises(PlannerError, match="SpaceInformation"):
             kind(grid, grid, ROBOTS["car"])

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import cv2
@@ -11,6 +13,29 @@ from helpers.scripts import run_script
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPTS = ROOT / "scripts"
+STUDIES = ROOT / "benchmarks" / "studies"
+
+# Runs in an environment of its own, with a package that is not ours.
+FOREIGN = {"hybrid_astar.py"}
+
+# Each by its path, as Python would begin to run it, in one process.
+IMPORT_ALL = """
+import runpy, sys
+for path in sys.argv[1:]:
+    sys.path.insert(0, path.rpartition("/")[0])
+    runpy.run_path(path, run_name="imported")
+    print(path)
+"""
+
+
+def test_all_scripts_find_what_they_import() -> None:
+    pytest.importorskip("torch")
+    files = [path for folder in (SCRIPTS, STUDIES) for path in sorted(folder.glob("*.py"))]
+    paths = [path.as_posix() for path in files if path.name not in FOREIGN]
+    command = [sys.executable, "-c", IMPORT_ALL, *paths]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split("\n")[:-1] == paths
 
 
 def test_overhead() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import runpy
 from pathlib import Path
 
 import pytest
@@ -145,3 +146,20 @@ def test_overlap(tmp_path: Path) -> None:
     summary = json.loads(report.read_text())["rows"]
     assert [row["way"] for row in summary] == ["uniform", "waiting", "overlap"] * 2
     assert [row["processor_ratio"] for row in summary[::3]] == [[1, 1, 1]] * 2
+
+
+def test_ablation_compares_runs_of_the_same_seed(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("torch")
+    monkeypatch.syspath_prepend(str(STUDIES))
+    summarize = runpy.run_path(str(STUDIES / "ablation.py"))["summarize"]
+    # What a seed adds to all variants is in the interval of the scores, not in the difference.
+    scores = {
+        name: [{"iou": base + seed} for seed in (0.0, 0.1, 0.2)]
+        for name, base in (("whole", 0.5), ("without attention", 0.4))
+    }
+    result = summarize(scores)
+    assert "difference" not in result["whole"]
+    assert result["without attention"]["difference"] == pytest.approx([-0.1, -0.1, -0.1])
+    # Student's factor for three values is 4.3027, their standard deviation 0.1.
+    half = 4.3027 * 0.1 / 3**0.5
+    assert result["whole"]["iou"] == pytest.approx([0.6, 0.6 - half, 0.6 + half], abs=1e-4)
