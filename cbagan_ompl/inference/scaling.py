@@ -7,6 +7,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
+from ..maps.blocks import any_in_blocks
 from ..maps.grid_map import GridMap
 
 # Small maps are enlarged by this factor at most: more shows the network nothing new, and the cost
@@ -58,4 +59,4 @@ def scaled_free(free: NDArray[np.bool_], shape: tuple[int, int]) -> NDArray[np.b
     if shape == free.shape:
         return free
     rows, columns = (np.arange(n) * size // n for n, size in zip(shape, free.shape, strict=True))
-    return np.logical_or.reduceat(np.logical_or.reduceat(free, rows, axis=0), columns, axis=1)
+    return any_in_blocks(free, rows, columns)

@@ -39,6 +39,7 @@ def find_path(
     start: tuple[int, int],
     goal: tuple[int, int],
     costs: NDArray[np.float32] | None = None,
+    cheapest: float | None = None,
 ) -> NDArray[np.intp] | None:
     """Return the cheapest 8-connected path between two pixels, without cutting corners.
 
@@ -47,6 +48,7 @@ def find_path(
         start: (column, row) of a free pixel.
         goal: (column, row) of a free pixel.
         costs: (H, W), positive, see :func:`.grid_search.shortest_path`; 1 by default.
+        cheapest: a lower bound of the costs; by default the least of them.
 
     Returns:
         Pixels (column, row), (K, 2), both endpoints included, at most a 4096th of the cheapest
@@ -67,10 +69,11 @@ def find_path(
     if costs is None:
         found = _search_jumps(cells.ravel(), width, first, last, before, paid)
     else:
-        padded = np.ones(cells.shape, np.float32)
+        padded = np.empty(cells.shape, np.float32)  # nobody asks for the costs of the border
         padded[1:-1, 1:-1] = costs
+        least = float(costs.min()) if cheapest is None else cheapest
         found = _search_steps(
-            cells.ravel(), padded.ravel(), width, first, last, float(costs.min()), before, paid
+            cells.ravel(), padded.ravel(), width, first, last, least, before, paid
         )
     if not found:
         return None

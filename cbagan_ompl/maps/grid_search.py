@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Protocol
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from .blocks import any_in_blocks
+
 # Coarse pixels to each side of the coarse path that make the band to search in.
 _BAND = 3
+
+
+class Costs(Protocol):
+    """The cost of a pixel length in each pixel, positive: an array, or what makes its parts."""
+
+    def __getitem__(self, window: tuple[slice, slice], /) -> NDArray[np.float32]:
+        """Return the costs in some rows and columns."""
 
 
 def prepare_search(with_costs: bool = False) -> None:
@@ -33,7 +43,7 @@ def shortest_path(
     free: NDArray[np.bool_],
     start: tuple[int, int],
     goal: tuple[int, int],
-    cost: NDArray[np.float32] | None = None,
+    cost: Costs | None = None,
     coarse_size: int = 256,
 ) -> NDArray[np.intp] | None:
     """Return the cheapest 8-connected path between two pixels.
@@ -57,42 +67,63 @@ def shortest_path(
     """
     from .compiled_search import find_path  # here, since numba takes long to import
 
-    if cost is not None and max(free.shape) > 2 * coarse_size:
-        band = _coarse_band(free, start, goal, cost, coarse_size)
-        path = None if band is None else find_path(free & band, start, goal, cost)
+    if cost is None:
+        return find_path(free, start, goal)
+    if max(free.shape) > 2 * coarse_size:
+        path = _search_coarsely(free, start, goal, cost, coarse_size)
         if path is not None:
             return path
-    return find_path(free, start, goal, cost)
+    return find_path(free, start, goal, cost[:, :])
 
 
-def _coarse_band(
+def _search_coarsely(
     free: NDArray[np.bool_],
     start: tuple[int, int],
     goal: tuple[int, int],
-    cost: NDArray[np.float32],
+    cost: Costs,
     coarse_size: int,
-) -> NDArray[np.bool_] | None:
-    """Return the pixels near the cheapest path through blocks of pixels.
+) -> NDArray[np.intp] | None:
+    """Return the cheapest path near the cheapest one through blocks of pixels; None for none.
 
     A block is free where any of its pixels is.
     """
     from .compiled_search import find_path
 
     size = -(-max(free.shape) // coarse_size)
-    padding = [(0, -side % size) for side in free.shape]
-    blocks = np.pad(free, padding)
-    shape = blocks.shape[0] // size, size, blocks.shape[1] // size, size
-    coarse = np.asarray(blocks.reshape(shape).any(axis=(1, 3)))
-    coarse_cost = np.pad(cost, padding, mode="edge").reshape(shape).mean(axis=(1, 3))
+    coarse = any_in_blocks(free, *(np.arange(0, side, size) for side in free.shape))
+    coarse_cost, cheapest = _mean_costs(cost, free.shape, size)
     source, target = ((u // size, v // size) for u, v in (start, goal))
     path = find_path(coarse, source, target, coarse_cost)
     if path is None:
         return None
     visited = np.zeros(coarse.shape, np.uint8)
     visited[path[:, 1], path[:, 0]] = 1
-    band = cv2.dilate(visited, np.ones((2 * _BAND + 1, 2 * _BAND + 1), np.uint8))
-    fine = band.repeat(size, axis=0).repeat(size, axis=1)[: free.shape[0], : free.shape[1]]
-    return fine.astype(bool)
+    band = cv2.dilate(visited, np.ones((2 * _BAND + 1, 2 * _BAND + 1), np.uint8)).view(np.bool_)
+    # Nothing is looked at but the smallest window around the band.
+    left, top = np.maximum(path.min(axis=0) - _BAND, 0).tolist()
+    right, bottom = (path.max(axis=0) + _BAND + 1).tolist()
+    rows, columns = slice(size * top, size * bottom), slice(size * left, size * right)
+    near = free[rows, columns]
+    fine = band[top:bottom, left:right].repeat(size, axis=0).repeat(size, axis=1)
+    fine = fine[: near.shape[0], : near.shape[1]] & near
+    first, last = ((u - columns.start, v - rows.start) for u, v in (start, goal))
+    path = find_path(fine, first, last, cost[rows, columns], cheapest)
+    return None if path is None else path + np.array((columns.start, rows.start))
+
+
+def _mean_costs(
+    cost: Costs, shape: tuple[int, ...], size: int
+) -> tuple[NDArray[np.float32], float]:
+    """Return the mean costs of blocks of pixels, and the least cost of a pixel."""
+    width = -(-shape[1] // size)
+    padding = width * size - shape[1]
+    means, cheapest = [], np.inf
+    for row in range(0, shape[0], size):
+        strip = cost[row : row + size, :]
+        cheapest = min(cheapest, float(strip.min()))
+        strip = np.pad(strip, ((0, size - len(strip)), (0, padding)), mode="edge")
+        means.append(strip.reshape(size, width, size).mean(axis=(0, 2)))
+    return np.array(means), cheapest
 
 
 def pull_taut(free: NDArray[np.bool_], pixels: NDArray[np.intp]) -> NDArray[np.float64]:

@@ -1,8 +1,8 @@
 """The nodes of :mod:`.passages` for maps that are scaled down, from all of their pixels.
 
 On a map that is scaled down, thin walls and narrow passages are lost. So the components of a patch
-are found among the pixels of the full map that it covers, and linked there. A pixel of the scaled
-map belongs to a node when any of its pixels does, so that it may belong to several.
+are found among the pixels of the full map that it covers, its block, and linked there. A pixel of
+the scaled map belongs to a node when any of its pixels does, so that it may belong to several.
 """
 
 from __future__ import annotations
@@ -10,7 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..common.bit_runs import pack_rows
 from ..common.compilation import compiled
+from .block_nodes import cut_block, label_block, make_room, read_column, read_row
 from .fast_marching import link_bits
 
 # The nodes of each code of a patch of 4 x 4 pixels, found when they are first needed.
@@ -37,16 +39,13 @@ def full_nodes(
         >>> codes[:, 0, 0].tolist(), linked[0].tolist()
         ([65535, 0, 0, 0], [[4112, 4097], [272, 257]])
     """
+    codes = np.zeros((4, *patches), np.int32)
     if shape == free.shape:
-        codes = np.zeros((4, *patches), np.int32)
         _read_patches(free, codes, _NODES_OF, _IS_KNOWN)
         return codes, link_bits(codes[None])[0]
-    rows, columns = _edges(free.shape, shape)
-    nodes = np.zeros(free.shape, np.uint8)
-    codes = np.zeros((4, *patches), np.int32)
     linked = np.zeros((4, *patches), np.uint16)
-    _label(free, rows, columns, nodes, codes)
-    _link(nodes, rows[:-1:4], columns[:-1:4], linked)
+    rows, columns = _edges(free.shape, shape)
+    _read_blocks(pack_rows(free), rows, columns, codes, linked)
     return codes, linked
 
 
@@ -67,18 +66,22 @@ def full_node_of(
     Returns:
         The index into the codes, flattened, as of :func:`.passages.endpoint_nodes`.
     """
-    rows, columns = _edges(free.shape, shape)
-    row = (int(np.searchsorted(rows, pixel[1], "right")) - 1) // 4
-    column = (int(np.searchsorted(columns, pixel[0], "right")) - 1) // 4
-    top, bottom = rows[4 * row], rows[min(4 * row + 4, shape[0])]
-    left, right = columns[4 * column], columns[min(4 * column + 4, shape[1])]
-    block = free[top:bottom, left:right]
-    nodes = np.zeros(block.shape, np.uint8)
-    own = np.zeros((4, 1, 1), np.int32)
-    heights = rows[4 * row : 4 * row + 5] - top
-    widths = columns[4 * column : 4 * column + 5] - left
-    _label(np.ascontiguousarray(block), heights, widths, nodes, own)
-    node = max(0, int(nodes[pixel[1] - top, pixel[0] - left]) - 1)
+    # Of the scaled map: the last row, and column, that begins no later than the pixel.
+    v, u = (((pixel[1 - i] + 1) * shape[i] - 1) // free.shape[i] for i in (0, 1))
+    row, column = v // 4, u // 4
+    own = codes[:, row, column]
+    if not own[1:].any():
+        node = 0
+    elif shape == free.shape:
+        node = int((own >> (4 * (v % 4) + u % 4) & 1).argmax())
+    else:
+        rows, columns = (
+            edges[4 * i : 4 * i + 5]
+            for edges, i in zip(_edges(free.shape, shape), (row, column), strict=True)
+        )
+        block = pack_rows(free[rows[0] : rows[-1], columns[0] : columns[-1]])
+        offset = pixel[1] - int(rows[0]), pixel[0] - int(columns[0])
+        node = max(0, _node_at(block, rows - rows[0], columns - columns[0], *offset) - 1)
     return int((node * codes.shape[1] + row) * codes.shape[2] + column)
 
 
@@ -103,8 +106,8 @@ def _read_patches(
         is_known: (65536,), of which codes they are.
     """
     height, width = free.shape
-    block, nodes = np.zeros((4, 4), np.bool_), np.zeros((4, 4), np.uint8)
-    labels, stack = np.empty(16, np.int32), np.empty(16, np.int64)
+    edges = np.arange(5)
+    block = make_room(edges, edges)
     for row in range(0, height, 4):
         for column in range(0, width, 4):
             code = 0
@@ -112,176 +115,90 @@ def _read_patches(
                 for j in range(min(4, width - column)):
                     code |= free[row + i, column + j] << (4 * i + j)
             if not is_known[code]:
-                for bit in range(16):
-                    block[bit // 4, bit % 4] = (code >> bit) & 1
-                _label_patch(block, labels, stack, nodes)
-                for bit in range(16):
-                    if nodes[bit // 4, bit % 4]:
-                        nodes_of[code, nodes[bit // 4, bit % 4] - 1] |= 1 << bit
+                for i in range(4):
+                    block.bits[i, 0] = (code >> (4 * i)) & 15
+                label_block(block, edges, edges, nodes_of[code])
                 is_known[code] = True
             for node in range(4):
                 codes[node, row // 4, column // 4] = nodes_of[code, node]
 
 
 @compiled
-def _label(
-    free: NDArray[np.bool_],
+def _read_blocks(
+    bits: NDArray[np.uint64],
     row_edges: NDArray[np.int64],
     column_edges: NDArray[np.int64],
-    nodes: NDArray[np.uint8],
     codes: NDArray[np.int32],
+    linked: NDArray[np.uint16],
 ) -> None:  # pragma: no cover
-    """Find the node of each pixel, from 1, and the codes of the nodes, both in place."""
-    height, width = len(row_edges) - 1, len(column_edges) - 1
-    most = 16 * np.max(np.diff(row_edges)) * np.max(np.diff(column_edges))
-    labels, stack = np.empty(most, np.int32), np.empty(most, np.int64)
-    for row in range(0, height, 4):
-        rows = row_edges[row : min(row + 4, height) + 1]
-        for column in range(0, width, 4):
-            columns = column_edges[column : min(column + 4, width) + 1]
-            block = free[rows[0] : rows[-1], columns[0] : columns[-1]]
-            own = nodes[rows[0] : rows[-1], columns[0] : columns[-1]]
-            code = codes[:, row // 4, column // 4]
-            count = _count(block)
-            if count == block.size:
-                own[:] = 1
-            elif count > 0:
-                _label_patch(block, labels, stack, own)
-            if count > 0:
-                _set_bits(own, rows, columns, count == block.size, code)
-
-
-@compiled
-def _count(block: NDArray[np.bool_]) -> int:  # pragma: no cover
-    """Return the number of free pixels."""
-    count = 0
-    for row in range(block.shape[0]):
-        for column in range(block.shape[1]):
-            count += block[row, column]
-    return count
-
-
-@compiled
-def _set_bits(
-    nodes: NDArray[np.uint8],
-    rows: NDArray[np.int64],
-    columns: NDArray[np.int64],
-    all_free: bool,
-    code: NDArray[np.int32],
-) -> None:  # pragma: no cover
-    """Set the bits of the nodes of a patch.
+    """Find the codes of the nodes, and their links, both in place.
 
     Args:
-        nodes: of the pixels.
-        rows: of the full map where the rows of the scaled one begin, and where the last ends.
-        columns: the same.
-        all_free: whether there is one node, of all pixels.
-        code: of each node, changed in place.
+        bits: of the full map, see :func:`.bit_runs.pack_rows`.
+        row_edges: where the rows of the scaled map begin in the full one, and its end.
+        column_edges: the same for columns.
+        codes: (4, rows, columns), zeros.
+        linked: the same.
     """
-    for i in range(len(rows) - 1):
-        for j in range(len(columns) - 1):
-            bit = 1 << (4 * i + j)
-            if all_free:
-                code[0] |= bit
-                continue
-            for row in range(rows[i] - rows[0], rows[i + 1] - rows[0]):
-                for column in range(columns[j] - columns[0], columns[j + 1] - columns[0]):
-                    if nodes[row, column]:
-                        code[nodes[row, column] - 1] |= bit
-
-
-@compiled
-def _label_patch(
-    block: NDArray[np.bool_],
-    labels: NDArray[np.int32],
-    stack: NDArray[np.int64],
-    nodes: NDArray[np.uint8],
-) -> None:  # pragma: no cover
-    """Find the nodes of the pixels of a patch, in place.
-
-    Args:
-        block: the pixels, true where free.
-        labels: room for one number for each pixel.
-        stack: the same.
-        nodes: of the pixels, from 1; 0 where blocked or left out.
-    """
-    columns = block.shape[1]
-    labels[: block.size] = 0
-    # The largest components that can be passed through, then the others: by one key.
-    keys = np.zeros(block.size + 1, np.int64)
-    count = 0
-    for first in range(block.size):
-        if labels[first] == 0 and block[first // columns, first % columns]:
-            count += 1
-            size, contacts = _fill(block, first, count, labels, stack)
-            keys[count] = size + (block.size if contacts > 1 else 0)
-    node_of = np.zeros(count + 1, np.uint8)
-    order = np.argsort(-keys[1 : count + 1], kind="mergesort") + 1
-    for rank in range(count):
-        is_merged = rank > 3 and keys[order[rank]] > block.size
-        if rank < 4 or is_merged:
-            node_of[order[rank]] = min(rank + 1, 4)
-    for row in range(block.shape[0]):
-        for column in range(columns):
-            nodes[row, column] = node_of[labels[row * columns + column]]
-
-
-@compiled
-def _fill(
-    block: NDArray[np.bool_],
-    first: int,
-    label: int,
-    labels: NDArray[np.int32],
-    stack: NDArray[np.int64],
-) -> tuple[int, int]:  # pragma: no cover
-    """Label the component of a pixel; return its size, and its contacts with the border."""
-    rows, columns = block.shape
-    labels[first], stack[0] = label, first
-    waiting, size, contacts = 1, 0, 0
-    while waiting:
-        waiting -= 1
-        row, column = stack[waiting] // columns, stack[waiting] % columns
-        size += 1
-        contacts += (row == 0) + (row == rows - 1) + (column == 0) + (column == columns - 1)
-        for y, x in ((row - 1, column), (row + 1, column), (row, column - 1), (row, column + 1)):
-            if not (0 <= y < rows and 0 <= x < columns) or not block[y, x]:
-                continue
-            if labels[y * columns + x] == 0:
-                labels[y * columns + x] = label
-                stack[waiting] = y * columns + x
-                waiting += 1
-    return size, contacts
+    room = make_room(row_edges, column_edges)
+    # The nodes of the pixels on both sides of where two blocks meet.
+    before, left = np.zeros((2, row_edges[-1]), np.uint8)
+    above, top = np.zeros((2, column_edges[-1]), np.uint8)
+    for i in range(0, len(row_edges) - 1, 4):
+        rows, row = row_edges[i : i + 5], i // 4
+        lines = slice(rows[0], rows[-1])
+        for j in range(0, len(column_edges) - 1, 4):
+            columns, column = column_edges[j : j + 5], j // 4
+            across = slice(columns[0], columns[-1])
+            block = cut_block(room, bits, rows, columns)
+            label_block(block, rows, columns, codes[:, row, column])
+            if column > 0:
+                read_column(block, 0, left[lines])
+                here = linked[:, row, column]
+                _link(before[lines], left[lines], linked[:, row, column - 1], here, 0)
+            if row > 0:
+                read_row(block, 0, top[across])
+                here = linked[:, row, column]
+                _link(above[across], top[across], linked[:, row - 1, column], here, 8)
+            read_column(block, columns[-1] - columns[0] - 1, before[lines])
+            read_row(block, rows[-1] - rows[0] - 1, above[across])
 
 
 @compiled
 def _link(
-    nodes: NDArray[np.uint8],
-    row_edges: NDArray[np.int64],
-    column_edges: NDArray[np.int64],
-    linked: NDArray[np.uint16],
+    first: NDArray[np.uint8],
+    second: NDArray[np.uint8],
+    before: NDArray[np.uint16],
+    here: NDArray[np.uint16],
+    axis: int,
 ) -> None:  # pragma: no cover
-    """Find the links of the nodes, in place.
+    """Link the nodes of two neighbouring blocks, in place.
 
     Args:
-        nodes: of each pixel.
-        row_edges: the first row of each patch.
-        column_edges: the first column of each patch.
-        linked: as of :func:`.fast_marching.link_bits`.
+        first: the nodes of the pixels of the left, or upper, block where they meet.
+        second: those of the other block.
+        before: links of the nodes of the first block, see :func:`.fast_marching.link_bits`.
+        here: those of the other block.
+        axis: the first bit of its directions: 0 along rows, 8 along columns.
     """
-    height, width = nodes.shape
-    rows, columns = np.append(row_edges, height), np.append(column_edges, width)
-    for row in range(len(row_edges)):
-        for column in range(len(column_edges)):
-            right, bottom = columns[column + 1], rows[row + 1]
-            if right < width:
-                for y in range(rows[row], bottom):
-                    a, b = nodes[y, right - 1], nodes[y, right]
-                    if a and b:
-                        linked[a - 1, row, column] |= 1 << (3 + b)
-                        linked[b - 1, row, column + 1] |= 1 << (a - 1)
-            if bottom < height:
-                for x in range(columns[column], right):
-                    a, b = nodes[bottom - 1, x], nodes[bottom, x]
-                    if a and b:
-                        linked[a - 1, row, column] |= 1 << (11 + b)
-                        linked[b - 1, row + 1, column] |= 1 << (7 + a)
+    for place in range(len(first)):
+        a, b = first[place], second[place]
+        if a and b:
+            before[a - 1] |= 1 << (axis + 3 + b)
+            here[b - 1] |= 1 << (axis + a - 1)
+
+
+@compiled
+def _node_at(
+    bits: NDArray[np.uint64],
+    rows: NDArray[np.int64],
+    columns: NDArray[np.int64],
+    row: int,
+    column: int,
+) -> int:  # pragma: no cover
+    """Return the node of a pixel of a map that is one block, from 1; 0 for none."""
+    block = cut_block(make_room(rows, columns), bits, rows, columns)
+    label_block(block, rows, columns, np.zeros(4, np.int32))
+    nodes = np.zeros(columns[-1], np.uint8)
+    read_row(block, row, nodes)
+    return int(nodes[column])

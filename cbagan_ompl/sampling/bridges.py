@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..maps.connectivity import in_one_component
-from ..maps.grid_map import GridMap
 from ..maps.grid_search import shortest_path
-from .bands import half_width, paint_band
+from .bands import half_width, paint_window
 from .pixels import pixel_pair
 
 if TYPE_CHECKING:
@@ -26,39 +26,59 @@ _REPAIR_SIZE = 128
 _REGION_COST = 0.02
 
 
+class _RegionCosts:
+    """Costs of which those inside a region are next to nothing, see :class:`.grid_search.Costs`.
+
+    Computed where they are asked for: a path leaves most of a large map alone.
+    """
+
+    def __init__(self, values: NDArray[np.float32], region: NDArray[np.bool_]) -> None:
+        self._values, self._region = values, region
+
+    def __getitem__(self, window: tuple[slice, slice]) -> NDArray[np.float32]:
+        outside = 1 + _REGION_COST - self._values[window]
+        return np.where(self._region[window], np.float32(_REGION_COST), outside)
+
+
 def connect(heatmap: Heatmap, endpoints: NDArray[np.float64]) -> Heatmap:
     """Return a heat map whose region connects two points; itself where it does already.
+
+    Elsewhere it has a bridge along the cheapest path through it.
 
     Args:
         heatmap: any heat map.
         endpoints: start and goal, connected by free pixels, (2, 2), pixels.
     """
-    region, grid = heatmap.region, heatmap.grid
-    if in_one_component(region, *pixel_pair(endpoints), connectivity=4):
+    region, grid, pixels = heatmap.region, heatmap.grid, pixel_pair(endpoints)
+    if in_one_component(region, *pixels, connectivity=4):
         return heatmap
-    values = bridge(heatmap.values, region, grid, endpoints)
-    return type(heatmap)(values, grid, heatmap.heading)
+    costs = _RegionCosts(heatmap.values, region)
+    path = shortest_path(grid.free, *pixels, costs, _REPAIR_SIZE)
+    assert path is not None, "the endpoints are connected"
+    width = half_width(grid, _BRIDGE_FRACTION)
+    return _raise(heatmap, *paint_window(grid.shape, path + np.float64(0.5), width))
 
 
-def bridge(
-    values: NDArray[np.float32],
-    region: NDArray[np.bool_],
-    grid: GridMap,
-    endpoints: NDArray[np.float64],
-) -> NDArray[np.float32]:
-    """Return the values of a heat map with a bridge along the cheapest path through it.
+def _raise(heatmap: Heatmap, window: tuple[slice, slice], least: NDArray[np.float32]) -> Heatmap:
+    """Return a heat map with larger values in a window.
 
     Args:
-        values: of the heat map, (H, W).
-        region: its promising region, (H, W), where a pixel costs next to nothing.
-        grid: the map.
-        endpoints: start and goal, connected by free pixels, (2, 2), pixels.
-
-    Returns:
-        (H, W).
+        heatmap: the heat map, which stays as it is.
+        window: rows and columns.
+        least: what the values of free pixels in the window are at least, in [0, 1].
     """
-    cost = np.where(region, np.float32(_REGION_COST), 1 + _REGION_COST - values)
-    pixels = shortest_path(grid.free, *pixel_pair(endpoints), cost, _REPAIR_SIZE)
-    assert pixels is not None, "the endpoints are connected"
-    band = paint_band(grid.shape, pixels + np.float64(0.5), half_width(grid, _BRIDGE_FRACTION))
-    return np.maximum(values, band)
+    support, width = heatmap.support, heatmap.grid.width
+    values = np.zeros(heatmap.values.shape, np.float32)
+    values.ravel()[support] = heatmap.values.ravel()[support]
+    inside = values[window]
+    np.maximum(inside, least * heatmap.grid.free[window], out=inside)
+    rows = window[0]
+    above, below = np.searchsorted(support, (rows.start * width, rows.stop * width))
+    middle = np.flatnonzero(values[rows] > 0) + rows.start * width
+    support = np.concatenate((support[:above], middle, support[below:]))
+    values.setflags(write=False)
+    # All that Heatmap() would check is known. The headings are the same.
+    raised = copy(heatmap)
+    raised.values, raised._support = values, support
+    raised.guarantee, raised._last_connected = None, (None, False)
+    return raised

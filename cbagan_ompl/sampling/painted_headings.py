@@ -21,14 +21,16 @@ class PaintedHeatmap(Heatmap):
             unknown.
         patches: rows and columns of patches that cover the map, at most (h, w); the last ones may
             be cut off by its edge.
+        painted: flat indices of the pixels that the network has painted, (K,).
     """
 
     directions: NDArray[np.float32]
     patches: tuple[float, float]
+    painted: NDArray[np.intp]
 
     @cached_property
     def heading(self) -> NDArray[np.float32]:  # type: ignore[override]
-        """The direction of travel where the heat map is not 0, see :class:`.heatmap.Heatmap`."""
+        """The direction of travel where the network has painted, see :class:`.heatmap.Heatmap`."""
         angles = np.arctan2(self.directions[1], self.directions[0])
         angles[(self.directions == 0).all(axis=0)] = np.nan
         if self.grid.origin is not None:  # turned by the yaw of its origin, and y points up
@@ -38,7 +40,7 @@ class PaintedHeatmap(Heatmap):
             for size, count in zip(self.grid.shape, self.patches, strict=True)
         )
         heading = np.full(self.grid.shape, np.nan, np.float32)
-        _spread(angles.astype(np.float32), rows, columns, self._support, heading)
+        _spread(angles.astype(np.float32), rows, columns, self.painted, heading)
         heading.setflags(write=False)
         return heading
 

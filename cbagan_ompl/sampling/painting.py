@@ -44,6 +44,7 @@ def paint_heatmap(
     if not count:
         return None
     result.setflags(write=False)
+    support = indices[:count].copy()
     # All that Heatmap() would check is known: it reads every pixel.
     heatmap: Heatmap
     if directions is None:
@@ -51,10 +52,10 @@ def paint_heatmap(
         heatmap.heading = None
     else:
         heatmap = painted = PaintedHeatmap.__new__(PaintedHeatmap)
-        painted.directions, painted.patches = directions, patches
+        painted.directions, painted.patches, painted.painted = directions, patches, support
     heatmap.values, heatmap.grid = result, grid
     heatmap.guarantee = None
-    heatmap._support = indices[:count].copy()
+    heatmap._support = support
     return heatmap
 
 

@@ -141,6 +141,53 @@ def test_a_wall_that_is_lost_when_a_map_is_scaled_down_still_parts_nodes() -> No
     assert 7 < distances[0, 0].ravel()[ends[1]] < 12
 
 
+@pytest.mark.parametrize("shape", [(8, 12), (6, 9)])
+def test_nodes_of_blocks_are_their_largest_components(shape: tuple[int, int]) -> None:
+    free = np.random.default_rng(4).random((24, 260)) < 0.6
+    codes, linked = full_nodes(free, shape, (2, 3))
+    rows, columns = (
+        np.arange(n + 1) * size // n for n, size in zip(shape, free.shape, strict=True)
+    )
+    nodes = np.zeros(free.shape, np.uint8)
+    for i, j in np.ndindex(2, 3):
+        edges = rows[4 * i : 4 * i + 5], columns[4 * j : 4 * j + 5]
+        block = np.s_[edges[0][0] : edges[0][-1], edges[1][0] : edges[1][-1]]
+        labels = label_components(free[block], connectivity=4)
+        contacts = sum(
+            (axis == 0) + (axis == size - 1).astype(int)
+            for axis, size in zip(np.indices(labels.shape), labels.shape, strict=True)
+        )
+        sizes = np.bincount(labels.ravel())
+        touching = np.bincount(labels.ravel(), contacts.ravel())
+        keys = {k: sizes[k] + labels.size * (touching[k] > 1) for k in range(1, len(sizes))}
+        ranked = sorted(keys, key=lambda k: (-keys[k], np.flatnonzero(labels.ravel() == k)[0]))
+        for rank, label in enumerate(ranked):
+            if rank < 4 or touching[label] > 1:
+                nodes[block][labels == label] = min(rank + 1, 4)
+        for node, (v, u) in ((n, p) for n in range(4) for p in np.ndindex(4, 4)):
+            is_inside = v + 1 < len(edges[0]) and u + 1 < len(edges[1])
+            own = (
+                is_inside
+                and (
+                    nodes[edges[0][v] : edges[0][v + 1], edges[1][u] : edges[1][u + 1]] == node + 1
+                ).any()
+            )
+            assert (codes[node, i, j] >> (4 * v + u)) & 1 == own
+    for row, column in np.argwhere(free)[::7].tolist():
+        found = full_node_of(free, shape, codes, (column, row))
+        node, i, j = np.unravel_index(found, codes.shape)
+        assert node == max(0, int(nodes[row, column]) - 1)
+        assert rows[4 * i] <= row < rows[min(4 * i + 4, shape[0])]
+        assert columns[4 * j] <= column < columns[min(4 * j + 4, shape[1])]
+    for j in (1, 2):  # the links across the sides of blocks
+        beside = nodes[: rows[4], columns[4 * j] - 1], nodes[: rows[4], columns[4 * j]]
+        pairs = {
+            (a - 1, b - 1) for a, b in zip(*map(np.ndarray.tolist, beside), strict=True) if a and b
+        }
+        bits = linked[:, 0, j - 1].astype(int) >> 4
+        assert pairs == {(a, b) for a, b in np.ndindex(4, 4) if (bits[a] >> b) & 1}
+
+
 def test_endpoints_are_in_the_node_of_their_pixel() -> None:
     free = random_map(3, 0.5)
     codes = codes_of(free)
