@@ -163,7 +163,7 @@ def ablation() -> str:
         least = min(run["connectivity"] for run in runs)
         difference = spread(scores["difference"], "+.4f") if "difference" in scores else "-"
         ious = spread(scores["iou"], ".4f")
-        rows.append([name, len(runs), ious, difference, f"{dice:.4f}", f"{100 * least:.1f} %"])
+        rows.append([name, str(len(runs)), ious, difference, f"{dice:.4f}", f"{100 * least:.1f} %"])
     header = ["network", "seeds", "IoU", "difference from the whole", "Dice"]
     return table([*header, "connected (8), least"], rows)
 
