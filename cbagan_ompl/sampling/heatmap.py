@@ -24,7 +24,7 @@ from .headings import check_headings, descend, look_up, sample_headings
 from .heatmap_files import read_heatmap_values
 from .heatmap_values import to_unit_range
 from .options import HeadingSpread
-from .pixels import pixel_pair, sample_in_pixels, sample_pixels
+from .pixels import WeightedPixels, pixel_pair, sample_in_pixels
 from .robot_heatmaps import robot_heatmap
 
 #: A pixel whose value is at least this belongs to the promising region.
@@ -301,8 +301,8 @@ class Heatmap:
         """
         count = whole_number("n", n, 0, _MOST_SAMPLES)
         generator = random_generator(rng)
-        cumulative = self.values.ravel()[self._support].cumsum(dtype=np.float64)
-        pixels = sample_pixels(self._support, cumulative, count, generator)
+        weighted = WeightedPixels(self._support, self.values.ravel()[self._support])
+        pixels = weighted.sample(count, generator)
         return sample_in_pixels(self.grid, pixels, generator)
 
     def sample_poses(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..errors import HeatmapError
 from ..maps.grid_map import GridMap
 from .informed_set import InformedSet
-from .pixels import sample_in_pixels, sample_pixels
+from .pixels import WeightedPixels, sample_in_pixels
 
 # The first batch is small, because small tasks need few samples; each is twice the one before.
 _FIRST_BATCH, _LARGEST_BATCH = 128, 1024
@@ -51,6 +51,8 @@ class PixelSampler:
         self._box: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
         self._batch = _FIRST_BATCH
         self._pending: list[tuple[float, float, float, int]] = []
+        # Those of the pixels that are sampled; made with the first batch.
+        self._active: WeightedPixels | None = None
         self.set_informed(None)
 
     def keep_inside(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> None:
@@ -87,7 +89,7 @@ class PixelSampler:
         self._bounds: NDArray[np.float64] | None = None
         self._pending.clear()
         if informed is None:
-            self._weight_pixels(inf)
+            self._active = None
 
     def next(self, best: float, covered: bytearray | None) -> tuple[float, float] | None:
         """Return the next sample, (x, y), world, where a path cheaper than ``best`` can pass.
@@ -123,9 +125,11 @@ class PixelSampler:
 
     def _refill(self, best: float) -> None:
         size, self._batch = self._batch, min(2 * self._batch, _LARGEST_BATCH)
-        if self._accepted * (1 + len(self._support) / _PIXELS_PER_BATCH) < 1:
-            self._weight_pixels(best)
-        pixels = sample_pixels(self._active, self._cumulative, size, self._rng)
+        if self._active is None:
+            self._active = WeightedPixels(self._support, self._weights)
+        elif self._accepted * (1 + len(self._support) / _PIXELS_PER_BATCH) < 1:
+            self._active = self._informed_pixels(best)
+        pixels = self._active.sample(size, self._rng)
         points = sample_in_pixels(self._grid, pixels, self._rng)
         bounds = np.full(size, -inf)
         if self._informed is not None:
@@ -136,17 +140,16 @@ class PixelSampler:
         columns = points[:, 0], points[:, 1], bounds, pixels
         self._pending = list(zip(*(column.tolist() for column in columns), strict=True))
 
-    def _weight_pixels(self, best: float) -> None:
-        """Weight only pixels with points in the informed set; where there are none, all of them."""
-        self._active, weights = self._support, self._weights
-        if self._informed is not None:
-            if self._bounds is None:
-                self._bounds = self._informed.pixel_cost_bounds(self._grid, self._support)
-            inside = np.asarray(self._bounds <= best)
-            if inside.any():
-                self._active = self._support[inside]
-                weights = None if weights is None else weights[inside]
-        self._cumulative = None if weights is None else weights.cumsum(dtype=np.float64)
+    def _informed_pixels(self, best: float) -> WeightedPixels:
+        """Return the pixels with points in the informed set; where there are none, all of them."""
+        assert self._informed is not None, "without it all samples are accepted"
+        if self._bounds is None:
+            self._bounds = self._informed.pixel_cost_bounds(self._grid, self._support)
+        inside = np.asarray(self._bounds <= best)
+        if not inside.any():
+            return WeightedPixels(self._support, self._weights)
+        weights = None if self._weights is None else self._weights[inside]
+        return WeightedPixels(self._support[inside], weights)
 
 
 def _are_inside(

@@ -3,11 +3,10 @@ from __future__ import annotations
 import json
 import signal
 import tarfile
-import time
 from pathlib import Path
 
 import pytest
-from helpers.interrupting import ended, interrupted
+from helpers.interrupting import after, ended, interrupted
 from helpers.training_set import assert_same_files, generate_small_set, write_training_set
 
 from cbagan_ompl.cli import main
@@ -117,8 +116,7 @@ def test_signals_at_any_time_leave_no_process_of_noise(
 ) -> None:
     root = write_training_set(tmp_path / "set")
     words = ["dataset", "noise", str(root), "--runs", "100000", "--jobs", "2"]
-    end = time.monotonic() + delay
-    ended_with, said = ended(words, lambda: time.monotonic() > end, number)
+    ended_with, said = ended(words, after(delay), number)
     assert ended_with == status, said
     assert said.splitlines()[-1] in ("interrupted", "terminated")
     assert "Traceback" not in said

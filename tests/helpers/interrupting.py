@@ -63,6 +63,9 @@ def ended(words: list[str], ready: Callable[[], bool], number: int) -> tuple[int
     )
     try:
         end = time.monotonic() + _PATIENCE_S
+        # Before that a signal finds Python's own start, not the command.
+        while not catches(process.pid, signal.SIGTERM) and process.poll() is None:
+            time.sleep(0.02)
         while not ready() and process.poll() is None and time.monotonic() < end:
             time.sleep(0.02)
         assert process.poll() is None, process.communicate()[1]
@@ -76,6 +79,27 @@ def ended(words: list[str], ready: Callable[[], bool], number: int) -> tuple[int
     finally:
         for pid in processes_of(process.pid):
             os.kill(pid, signal.SIGKILL)
+
+
+def catches(pid: int, number: int) -> bool:
+    """Return whether a process has a handler for a signal, from /proc."""
+    try:
+        status = Path(f"/proc/{pid}/status").read_text()
+    except OSError:  # has ended
+        return False
+    caught = next(line.split()[1] for line in status.splitlines() if line.startswith("SigCgt"))
+    return bool(int(caught, 16) >> (number - 1) & 1)
+
+
+def after(delay: float) -> Callable[[], bool]:
+    """Return what is true some seconds after it is asked first."""
+    times: list[float] = []
+
+    def is_past() -> bool:
+        times.append(time.monotonic())
+        return times[-1] > times[0] + delay
+
+    return is_past
 
 
 def processes_of(session: int) -> list[int]:
