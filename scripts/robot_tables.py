@@ -36,12 +36,16 @@ def car_suites() -> str:
     names = ("scene", "planner", "sampler")
     rows = [
         [
-            *(row[name] for name in names),
+            *(row[name] or "-" for name in names),
             str(row["runs"]),
             f"{row['solved']:.0%}",
-            f"{row['first_ms']:.0f}",
-            f"{row['cost']:.1f}",
+            number(row["first_ms"], ".0f"),
+            number(row["cost"], ".1f"),
         ]
         for row in read("car_suites_ompl_2.0.1.json")["rows"]
     ]
     return table(header, rows)
+
+
+def number(value: float | None, form: str) -> str:
+    return "-" if value is None else f"{value:{form}}"
