@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from suite_tables import Json, read
+from suite_tables import VERSIONS, Json, read
 
 from cbagan_ompl.common.markdown import table
 
-VERSIONS = ("2.0.1", "1.7.0")
 MAPS = {
     "bundled": "bundled maps",
     "generated": "generated maps",
