@@ -23,7 +23,6 @@ from helpers.setups import (
 
 from cbagan_ompl import PlannerError, attach, plan, reached_planners
 from cbagan_ompl.planning import compat
-from cbagan_ompl.planning.attach import Attachment
 from cbagan_ompl.planning.compat import ob, ou
 from cbagan_ompl.planning.monitor import release_forgotten
 
@@ -205,11 +204,12 @@ def test_forgotten_attachments_are_let_go_when_another_planner_solves() -> None:
 
 
 def test_a_setup_that_only_its_solve_refers_to_is_not_forgotten() -> None:
-    made: list[Attachment] = []
+    samplers: list[Any] = []
 
     def attached_setup() -> Any:
         setup = small_setup(GRID, "RRTstar")
-        made.append(attach(setup, HEATMAP, seed=1))
+        attachment = attach(setup, HEATMAP, seed=1)
+        samplers.append(attachment._sampler)
         return setup
 
     solve_for(attached_setup(), 50)
@@ -220,7 +220,7 @@ def test_a_setup_that_only_its_solve_refers_to_is_not_forgotten() -> None:
         return next(steps, None) is None
 
     attached_setup().solve(compat.termination_condition(attach_another))
-    assert all(attachment.sample_counts["learned"] > 20 for attachment in made)
+    assert all(sampler.sample_counts["learned"] > 20 for sampler in samplers)
 
 
 LOSING = """
