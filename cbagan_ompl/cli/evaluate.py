@@ -99,10 +99,10 @@ def _evaluate(args: argparse.Namespace) -> int:
     check_at_least("seed", args.seed, 0)
     stored = [_parse_predictions(text) for text in args.predictions]
     files = [find_model(model) for model in args.model or [None]]
+    dataset = load_dataset(args.dataset)
+    # The models after that: to load them takes a while, and to evaluate them more.
     models = [load_model(path) for path in files]
     names = [str(model.record["name"]) for model in models] + [name for name, _ in stored]
-    dataset = load_dataset(args.dataset)
-    # Before the models are evaluated, which takes a while.
     regions = [load_predictions(path, Path(args.dataset), args.split) for _, path in stored]
     tasks = dataset.test if args.split == "test" else dataset.train
     baselines = trivial_baselines(tasks)

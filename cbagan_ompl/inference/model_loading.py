@@ -6,10 +6,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..common.validation import require, require_torch
+from ..common.validation import require_torch
 from .convolutions import use_onednn
 from .model_files import ModelFile, ModelFormat, load_graphs, load_script
-from .onnx_graphs import OnnxGraphs
+from .onnx_graphs import OnnxGraphs, require_onnx_runtime
 from .probe import Kind, try_model
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def prepare_runtime(source: Path, model: ModelFile) -> None:
     """
     is_onnx = model.format is ModelFormat.ONNX
     if is_onnx:
-        require("onnxruntime", "onnx")
+        require_onnx_runtime()
     else:
         require_torch()
     if not model.is_listed:

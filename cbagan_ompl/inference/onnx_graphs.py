@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
@@ -30,7 +31,7 @@ class OnnxGraphs:
     """
 
     def __init__(self, graphs: Mapping[str, bytes]) -> None:
-        require("onnxruntime", "onnx")
+        require_onnx_runtime()
         self._graphs = dict(graphs)
         self.threads = 1
         self._loaded_for = 0
@@ -71,6 +72,19 @@ class OnnxGraphs:
             taken = [(key, int(key.rpartition("_")[2])) for key in names]
             self._sessions[name] = session, taken
         self._loaded_for = self.threads
+
+
+def require_onnx_runtime() -> None:
+    """Raise if ONNX Runtime cannot be imported, and have it keep to itself how it is used.
+
+    From 1.32 on it writes a file and sends figures to its makers as soon as it is imported, unless
+    the environment says otherwise. A variable that is set already stays.
+
+    Raises:
+        MissingDependencyError: it cannot be imported; the message says how to install it.
+    """
+    os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
+    require("onnxruntime", "onnx")
 
 
 def flatten(inputs: Sequence[Any]) -> list[NDArray[Any]]:
