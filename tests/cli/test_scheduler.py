@@ -175,3 +175,15 @@ def test_noise_is_the_same_on_workers(cluster: Cluster, tmp_path: Path) -> None:
     words += ["--scheduler", cluster.address, "--json", str(tmp_path / "remote.json")]
     assert main(words) == 0
     assert (tmp_path / "local.json").read_text() == (tmp_path / "remote.json").read_text()
+
+
+@pytest.mark.parametrize("label", ["rrt", "geodesic"])
+def test_labels_of_own_maps_are_the_same_on_workers(
+    cluster: Cluster, tmp_path: Path, label: str
+) -> None:
+    words = ["dataset", "label", "bundled:maze", "bundled:rooms", "--size", "64", "--tasks", "2"]
+    words += ["--label", label, "--runs", "3", "--seed", "1"]
+    local, remote = tmp_path / "local", tmp_path / "remote"
+    assert main([*words, "--output", str(local)]) == 0
+    assert main([*words, "--output", str(remote), "--scheduler", cluster.address]) == 0
+    assert_same_files(local, remote)
