@@ -84,6 +84,16 @@ def test_benchmark_is_the_same_on_workers(cluster: Cluster, tmp_path: Path) -> N
     assert first.is_file()
 
 
+def test_a_cluster_that_cannot_be_used_leaves_no_folder(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = tmp_path / "results"
+    words = ["benchmark", "bundled:maze", "--samplers", "uniform", "--output", str(output)]
+    assert main([*words, "--scheduler", "nowhere://host"]) == 2
+    assert "no scheduler answers at 'nowhere://host'" in capsys.readouterr().err
+    assert not output.exists()
+
+
 def test_tasks_that_fail_are_reported_alone(
     cluster: Cluster, two_walls: GridMap, tmp_path: Path
 ) -> None:
