@@ -57,7 +57,7 @@ def load_predictions(folder: Path, dataset: Path, part: str) -> NDArray[np.bool_
         # In a gray image white may be the region, and would be read as what is outside of it.
         if regions[i].any() and (image[..., :1] == image[..., 1:]).all():
             raise DatasetError(
-                f"{files[name]} is a gray image; a stored prediction has its region in green, on white"
+                f"{files[name]} is a gray image; stored predictions are green on white"
             )
     assert regions is not None, "the lists of a set are not empty"
     return regions

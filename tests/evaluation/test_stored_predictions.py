@@ -46,7 +46,7 @@ def test_gray_predictions_are_not_guessed_at(
     store(tmp_path, folder, regions, listed=True)
     assert not load_predictions(tmp_path, folder, "test")[0].any(), "white alone is no region"
     cv2.imwrite(str(tmp_path / "roi_0.png"), dataset.test.region[0] * np.uint8(255))
-    with pytest.raises(DatasetError, match=r"roi_0\.png is a gray image; .* in green, on white"):
+    with pytest.raises(DatasetError, match=r"roi_0\.png is a gray image; .* green on white"):
         load_predictions(tmp_path, folder, "test")
 
 
