@@ -8,6 +8,7 @@ import pytest
 
 from cbagan_ompl import GridMap, Heatmap
 from cbagan_ompl.sampling.painting import paint_heatmap
+from cbagan_ompl.sampling.sampler import HeatmapSampler
 
 SHAPES = [(40, 33), (80, 66), (160, 132), (97, 71), (41, 66), (20, 16), (20, 70)]
 
