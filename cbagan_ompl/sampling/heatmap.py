@@ -24,7 +24,7 @@ from .headings import check_headings, descend, look_up, sample_headings
 from .heatmap_files import read_heatmap_values
 from .heatmap_values import to_unit_range
 from .options import HeadingSpread
-from .pixels import WeightedPixels, pixel_pair, sample_in_pixels
+from .pixels import PixelPair, WeightedPixels, pixel_pair, sample_in_pixels
 from .robot_heatmaps import robot_heatmap
 
 #: A pixel whose value is at least this belongs to the promising region.
@@ -47,6 +47,7 @@ class Heatmap:
         heading: float32, shape (H, W): the direction of travel in each pixel, world radians in
             [-pi, pi], NaN where unknown; or None where nothing is known.
         guarantee: what is known of the pixels from a threshold on; None where nothing is.
+        support: flat row-major indices of the pixels with a value above 0, ascending, shape (K,).
 
     Args:
         values: any real array of the grid's shape. Unsigned integers are scaled from their full
@@ -68,7 +69,7 @@ class Heatmap:
         (3, 2)
     """
 
-    _last_connected: tuple[object, bool] = None, False  # a pair of pixels, and the answer
+    _last_connected: tuple[PixelPair | None, bool] = None, False  # a pair of pixels, and the answer
 
     def __init__(self, values: ArrayLike, grid: GridMap, heading: ArrayLike | None = None) -> None:
         check_grid(grid, HeatmapError)
@@ -96,7 +97,7 @@ class Heatmap:
         self.grid = grid
         self.heading = None if heading is None else check_headings(heading, grid)
         self.guarantee: Guarantee | None = None
-        self._support = support
+        self.support: NDArray[np.intp] = support
 
     @classmethod
     def load(cls, path: str | PathLike[str], grid: GridMap) -> Heatmap:
@@ -216,7 +217,10 @@ class Heatmap:
         endpoints = np.array((check_point("start", start), check_point("goal", goal)))
         if not self.grid.is_free(endpoints).all():
             return False
-        pixels = pixel_pair(self.grid.to_pixel(endpoints))
+        return self._connects_pixels(pixel_pair(self.grid.to_pixel(endpoints)))
+
+    def _connects_pixels(self, pixels: PixelPair) -> bool:
+        """Return whether the region connects two pixels; the last answer is kept."""
         if self._last_connected[0] != pixels:
             self._last_connected = pixels, in_one_component(self.region, *pixels, connectivity=4)
         return self._last_connected[1]
@@ -301,7 +305,7 @@ class Heatmap:
         """
         count = whole_number("n", n, 0, _MOST_SAMPLES)
         generator = random_generator(rng)
-        weighted = WeightedPixels(self._support, self.values.ravel()[self._support])
+        weighted = WeightedPixels(self.support, self.values.ravel()[self.support])
         pixels = weighted.sample(count, generator)
         return sample_in_pixels(self.grid, pixels, generator)
 
@@ -338,11 +342,6 @@ class Heatmap:
             look_up(self.heading, self.grid, points), spread, generator, reverses
         )
         return np.column_stack((points, headings))
-
-    @property
-    def support(self) -> NDArray[np.intp]:
-        """Flat row-major indices of the pixels with a value above 0, ascending, shape (K,)."""
-        return self._support
 
     def __repr__(self) -> str:
         fraction = self.region.sum() / self.grid.free.sum()
