@@ -7,6 +7,7 @@ import argparse
 # Names under which commands keep them, but for maps.
 _ARGUMENTS = (
     "heatmap",
+    "footprint",
     "model",
     "checkpoint",
     "dataset",

@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
-from ..common.outputs import write_report
+from ..common.outputs import check_distinct, write_report
 from ..common.validation import require_torch, whole_number
 from ..datasets.dataset import load_dataset
 from ..datasets.synthetic import HARD_DETOUR, TASKS_PER_MAP, SyntheticSettings
@@ -280,7 +280,9 @@ def _export(args: argparse.Namespace) -> int:
         raise ConfigError(f"--format {args.format} writes a file whose name ends in {suffix}")
     _check_weights(Path(args.checkpoint))
     require_torch()
-    from ..training.export import export
+    from ..training.export import export, exported_files
+
+    check_distinct(args.json, *map(str, exported_files(Path(args.output))))
 
     record = export(
         args.checkpoint, args.output, note=args.note, force=getattr(args, "force", False)

@@ -152,13 +152,20 @@ def _origin() -> dict[str, str]:
     return {"torch": str(torch.__version__), "date": date.isoformat()}
 
 
+def exported_files(model: Path) -> tuple[Path, Path, Path]:
+    """Return the files that an export writes: the model, its card and the list of models.
+
+    Example:
+        >>> [path.name for path in exported_files(Path("models/mine.pt"))]
+        ['mine.pt', 'mine.md', 'manifest.json']
+    """
+    return model, model.parent / f"{model.stem}.md", model.parent / MANIFEST
+
+
 def _check_outputs(model: Path, checkpoint: Path, force: bool) -> None:
     """Raise if a file would be overwritten that is an input, or that no export wrote."""
-    for path, is_ours in (
-        (model, is_model),
-        (model.with_suffix(".md"), is_card),
-        (model.parent / MANIFEST, _is_manifest),
-    ):
+    kinds = is_model, is_card, _is_manifest
+    for path, is_ours in zip(exported_files(model), kinds, strict=True):
         check_output(str(path), [checkpoint], force=True)
         if path.exists() and not force and not is_ours(path):
             raise ModelError(

@@ -306,6 +306,17 @@ def test_no_input_is_replaced(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert path.read_bytes() == before
 
 
+def test_a_footprint_is_an_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "robot.yaml"
+    path.write_text("footprint: [[0, 0], [2, 0], [0, 2]]")
+    before = path.read_bytes()
+    for option in ("--json", "--csv"):
+        words = [*QUICK, "--footprint", str(path), option, str(path), "--force"]
+        assert main(words) == 2
+        assert "it is what the command reads" in capsys.readouterr().err
+    assert path.read_bytes() == before
+
+
 def test_what_a_map_names_is_an_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     image, scenes = tmp_path / "pixels.png", tmp_path / "cells.map.scen"
     cv2.imwrite(str(image), np.full((40, 40), 255, np.uint8))

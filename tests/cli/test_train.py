@@ -84,6 +84,11 @@ def test_train_and_export_commands(
     capsys.readouterr()
     with pytest.raises(ConfigError, match=r"--format onnx writes a file .* ends in \.onnx"):
         run(*words, "--format", "onnx")
+    card = (tmp_path / "tiny.md").read_bytes()
+    for name in ("tiny.pt", "tiny.md", "manifest.json"):
+        with pytest.raises(ConfigError, match="name of its own"):
+            run(*words, "--json", str(tmp_path / name))
+    assert (tmp_path / "tiny.md").read_bytes() == card
 
 
 @pytest.mark.parametrize("kept", [False, True])
