@@ -73,8 +73,8 @@ def pose_extension(planner: Any, sampler: HeatmapSampler) -> PoseExtension | Non
         sampler: of the planner.
 
     Returns:
-        None where a robot can turn on the spot or has more to its state than a pose, where the planner plans controls, and where the
-        headings are all uniform or the tree is not watched.
+        None where a robot can turn on the spot or has more to its state than a pose, where the
+        planner plans controls, and where all headings are uniform or the tree is not watched.
     """
     si, spread = planner.getSpaceInformation(), sampler.spread
     space = si.getStateSpace()

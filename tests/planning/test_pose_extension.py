@@ -11,7 +11,10 @@ from cbagan_ompl import GridMap, HeadingSpread, Heatmap, attach
 from cbagan_ompl.planning import compat
 from cbagan_ompl.planning.compat import ob, og, ou
 from cbagan_ompl.planning.pose_extension import PoseExtension, pose_extension
-from cbagan_ompl.sampling.options import NO_ADAPTATION
+from cbagan_ompl.sampling.adaptation import AdaptiveMixture
+from cbagan_ompl.sampling.monitor import NoMonitor
+from cbagan_ompl.sampling.options import FULL_ADAPTATION, NO_ADAPTATION
+from cbagan_ompl.sampling.sampler import HeatmapSampler
 
 SIDE, RADIUS, RANGE = 128, 6.0, 15.0
 FREE = np.ones((SIDE, SIDE), bool)
@@ -94,7 +97,8 @@ def test_learned_samples_before_the_first_path_extend_the_tree(
         counts = attachment.sample_counts
     assert setup.haveExactSolutionPath()
     assert records.found > 5
-    assert records.calls <= counts["learned"] and counts["uniform"] > 0
+    assert records.calls <= counts["learned"]
+    assert counts["uniform"] > 0
     assert records.calls_with_path == 0, "samples follow the heat map after the first path"
 
 
@@ -130,11 +134,6 @@ def test_a_heatmap_that_does_not_connect_is_not_extended(monkeypatch: pytest.Mon
 def test_poses_that_are_reached_in_collision_are_not_taken() -> None:
     setup = make_setup("Dubins")
     heatmap = Heatmap.uniform(GridMap(FREE))
-    from cbagan_ompl.sampling.adaptation import AdaptiveMixture
-    from cbagan_ompl.sampling.monitor import NoMonitor
-    from cbagan_ompl.sampling.options import FULL_ADAPTATION
-    from cbagan_ompl.sampling.sampler import HeatmapSampler
-
     setup.setup()
     mixture = AdaptiveMixture(heatmap, FULL_ADAPTATION, 5.0, NoMonitor())
     sampler = HeatmapSampler(heatmap, seed=1, mixture=mixture)
@@ -149,5 +148,6 @@ def test_poses_that_are_reached_in_collision_are_not_taken() -> None:
         state = compat.typed_state(other)
         if extension.move(state):
             found += 1
-            assert si.checkMotion(node, state) and state.getX() < 60
+            assert si.checkMotion(node, state)
+            assert state.getX() < 60
     assert found > 0

@@ -43,7 +43,8 @@ def test_poses_are_in_reach() -> None:
     poses = poses_of(make())
     ahead = (poses[:, :2] - NODE[:2]) @ (cos(NODE[2]), np.sin(NODE[2]))
     distance = np.hypot(*(poses[:, :2] - NODE[:2]).T)
-    assert (distance <= RANGE).all() and distance.max() > 0.9 * RANGE
+    assert (distance <= RANGE).all()
+    assert distance.max() > 0.9 * RANGE
     assert (np.abs((poses[:, 2] - NODE[2] + pi) % (2 * pi) - pi) <= RANGE / RADIUS).all()
     assert (ahead > 0).mean() > 0.9
     assert ((poses[:, 2] >= -pi) & (poses[:, 2] < pi)).all()
@@ -67,7 +68,8 @@ def test_no_pose_where_the_tree_is_or_the_heatmap_is_zero() -> None:
     values = np.ones((SIDE, SIDE))
     values[:, :35] = 0
     poses = poses_of(make(values=values), bytearray(covered.tobytes()))
-    assert (poses[:, 1] >= 40).all() and (poses[:, 0] >= 35).all()
+    assert (poses[:, 1] >= 40).all()
+    assert (poses[:, 0] >= 35).all()
     assert make().propose(bytearray(b"\1" * SIDE * SIDE)) is None
 
 
@@ -81,7 +83,8 @@ def test_a_tree_that_begins_anew_forgets_its_nodes() -> None:
         added.add(node)
     covered = bytearray(SIDE * SIDE)
     nodes = {pair[0] for pair in (extension.propose(covered) for _ in range(200)) if pair}
-    assert nodes <= added and len(nodes) > 100
+    assert nodes <= added
+    assert len(nodes) > 100
     extension.add(*NODE, 1)
     assert len(poses_of(extension)) == 300, "of the only node"
 
@@ -91,7 +94,8 @@ def test_poses_off_the_map_are_not_proposed() -> None:
     extension.add(1.0, 1.0, pi / 4, 1)
     for _ in range(200):
         pair = extension.propose(bytearray(SIDE * SIDE))
-        assert pair is not None and GRID.is_free(np.array([pair[1][:2]])).all()
+        assert pair is not None
+        assert GRID.is_free(np.array([pair[1][:2]])).all()
         assert hypot(pair[1][0] - 1, pair[1][1] - 1) <= RANGE
 
 
