@@ -1,4 +1,4 @@
-"""Poses that a planner's tree reaches in one step, for robots with a turning radius."""
+"""Poses that a planner's tree reaches in one step, for robots that drive forwards alone."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ..sampling.sampler import HeatmapSampler
 from .compat import new_state, ob, typed_state
 from .goal_approach import turning_radius
 from .planner_kinds import plans_controls
-from .states import drives_backwards, state_access
+from .states import state_access
 
 if TYPE_CHECKING:
     from ..sampling.tree_extension import TreeExtension
@@ -73,21 +73,19 @@ def pose_extension(planner: Any, sampler: HeatmapSampler) -> PoseExtension | Non
         sampler: of the planner.
 
     Returns:
-        None where a robot can turn on the spot or has more to its state than a pose, where the
-        planner plans controls, and where all headings are uniform or the tree is not watched.
+        None where states are not those of Dubins curves, where the planner plans controls, and
+        where all headings are uniform or the tree is not watched.
     """
     si, spread = planner.getSpaceInformation(), sampler.spread
     space = si.getStateSpace()
-    if not isinstance(space, ob.DubinsStateSpace | ob.ReedsSheppStateSpace):
+    if not isinstance(space, ob.DubinsStateSpace):
         return None
     if plans_controls(planner) or sampler.covered is None or spread.uniform_fraction == 1:
         return None
     from ..sampling.tree_extension import TreeExtension  # compiled
 
-    reverse_fraction = spread.reverse_fraction if drives_backwards(space) else None
-    extension = TreeExtension(
-        sampler.heatmap, turning_radius(space), range_of(planner), reverse_fraction, sampler.rng
-    )
+    radius, range = turning_radius(space), range_of(planner)
+    extension = TreeExtension(sampler.heatmap, radius, range, sampler.rng)
     return PoseExtension(si, sampler, extension)
 
 

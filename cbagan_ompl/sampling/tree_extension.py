@@ -20,7 +20,7 @@ _FIRST_ROOM = 256
 
 
 class TreeExtension:
-    """Propose poses near a planner's tree, for robots that turn along arcs.
+    """Propose poses near a planner's tree, for robots that drive forwards alone, along arcs.
 
     A pose of the heat map is reached only by chance from a node that is near: most of the steps
     towards one collide, or end in another heading. So these poses are found from the nodes: two
@@ -31,14 +31,12 @@ class TreeExtension:
         heatmap: with the headings that are to be followed.
         radius: the turning radius, world units.
         range: how long both arcs are together at most, world units.
-        reverse_fraction: fraction of the arcs that are driven backwards; None for a robot that
-            drives forwards alone.
         rng: the generator.
 
     Example:
         >>> from cbagan_ompl import GridMap
         >>> heatmap = Heatmap(np.ones((50, 50)), GridMap(np.ones((50, 50), bool)))
-        >>> extension = TreeExtension(heatmap, 5.0, 20.0, None, np.random.default_rng(0))
+        >>> extension = TreeExtension(heatmap, 5.0, 20.0, np.random.default_rng(0))
         >>> extension.add(25.0, 25.0, 0.0, 1)
         >>> node, (x, y, yaw) = extension.propose(bytearray(50 * 50))
         >>> node, bool(np.hypot(x - 25, y - 25) <= 20)
@@ -50,7 +48,6 @@ class TreeExtension:
         heatmap: Heatmap,
         radius: float,
         range: float,
-        reverse_fraction: float | None,
         rng: np.random.Generator,
     ) -> None:
         grid = heatmap.grid
@@ -58,8 +55,7 @@ class TreeExtension:
         heading = np.full(grid.shape, np.nan, np.float32) if known is None else known
         self._offers = np.where(heatmap.values > 0, heading, np.float32(np.inf))
         self._affine = np.array(grid.pixel_from_world)
-        self._limits = radius, float(range), reverse_fraction or 0.0
-        self._turned = np.inf if reverse_fraction is None else pi - FOLLOWING
+        self._radius, self._range = radius, float(range)
         self._rng = rng
         self._nodes, self._count = np.empty((_FIRST_ROOM, 3)), 0
         self.propose(bytearray(grid.width * grid.height))  # compiled before it is needed
@@ -94,7 +90,7 @@ class TreeExtension:
         nodes = self._nodes[: self._count]
         mask = np.frombuffer(covered, np.uint8).reshape(self._offers.shape)
         number, *pose = _find(
-            nodes, _TRIES, self._rng, self._affine, self._offers, mask, *self._limits, self._turned
+            nodes, _TRIES, self._rng, self._affine, self._offers, mask, self._radius, self._range
         )
         if number < 0:
             return None
@@ -112,8 +108,6 @@ def _find(
     covered: NDArray[np.uint8],
     radius: float,
     range: float,
-    reverse_fraction: float,
-    turned: float,
 ) -> tuple[int, float, float, float]:  # pragma: no cover
     """Return the number of a node and a pose that is reached from it; -1 for none.
 
@@ -126,8 +120,6 @@ def _find(
         covered: of the pixels, 1 where the tree is.
         radius: the turning radius.
         range: the greatest length.
-        reverse_fraction: fraction that is driven backwards.
-        turned: the deviation from which a heading counts as reversed.
     """
     height, width = offers.shape
     if len(nodes) == 0:
@@ -136,8 +128,6 @@ def _find(
         number = int(rng.random() * len(nodes))
         x, y, yaw = nodes[number]
         length = range * (_SHORTEST + (1 - _SHORTEST) * rng.random())
-        if rng.random() < reverse_fraction:
-            length = -length
         first = rng.random()
         for part in (first, 1 - first):
             half = part * length * (2 * rng.random() - 1) / (2 * radius)
@@ -154,6 +144,6 @@ def _find(
             continue
         deviation = abs((yaw - offer + pi) % (2 * pi) - pi)
         # NaN fails the comparison.
-        if not FOLLOWING < deviation < turned:
+        if not deviation > FOLLOWING:
             return number, x, y, (yaw + pi) % (2 * pi) - pi
     return -1, 0.0, 0.0, 0.0

@@ -1,4 +1,4 @@
-"""Samples that a planner's tree reaches in one step, for robots with a turning radius."""
+"""Samples that a planner's tree reaches in one step, for robots that drive forwards alone."""
 
 from __future__ import annotations
 
@@ -85,11 +85,10 @@ def solve(setup: Any, samples: int) -> None:
 
 
 @pytest.mark.parametrize("planner", ["RRT", "RRTstar"])
-@pytest.mark.parametrize("kind", ["Dubins", "ReedsShepp"])
 def test_learned_samples_before_the_first_path_extend_the_tree(
-    kind: str, planner: str, monkeypatch: pytest.MonkeyPatch
+    planner: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    setup = make_setup(kind, planner)
+    setup = make_setup("Dubins", planner)
     records = _Records(monkeypatch, setup)
     heatmap = Heatmap.corridor(GridMap(FREE), (20, 20), (110, 20))
     with attach(setup, heatmap, seed=1) as attachment:
@@ -106,6 +105,7 @@ def test_learned_samples_before_the_first_path_extend_the_tree(
     ("kind", "options"),
     [
         ("SE2", {}),
+        ("ReedsShepp", {}),
         ("Dubins", {"adaptation": NO_ADAPTATION}),
         ("Dubins", {"heading": HeadingSpread(uniform_fraction=1)}),
     ],

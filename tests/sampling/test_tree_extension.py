@@ -16,14 +16,12 @@ GRID = GridMap(np.ones((SIDE, SIDE), bool))
 NODE = (32.0, 32.0, 0.5)
 
 
-def make(
-    heading: float = nan, reverse_fraction: float | None = None, values: np.ndarray | None = None
-) -> TreeExtension:
+def make(heading: float = nan, values: np.ndarray | None = None) -> TreeExtension:
     heatmap = Heatmap(np.ones((SIDE, SIDE)) if values is None else values, GRID)
     if heading == heading:
         heatmap = heatmap.with_heading(np.full((SIDE, SIDE), heading))
     rng = np.random.default_rng(3)
-    extension = TreeExtension(heatmap, RADIUS, RANGE, reverse_fraction, rng)
+    extension = TreeExtension(heatmap, RADIUS, RANGE, rng)
     extension.add(*NODE, 1)
     return extension
 
@@ -55,11 +53,6 @@ def test_poses_follow_the_heatmap(turning: float) -> None:
     poses = poses_of(make(NODE[2] + turning))
     deviation = np.abs((poses[:, 2] - NODE[2] - turning + pi) % (2 * pi) - pi)
     assert deviation.max() <= FOLLOWING + 1e-6
-    reversing = poses_of(make(NODE[2] + turning, 0.5))
-    deviation = np.abs((reversing[:, 2] - NODE[2] - turning + pi) % (2 * pi) - pi)
-    assert (np.minimum(deviation, pi - deviation) <= FOLLOWING + 1e-6).all()
-    behind = (reversing[:, :2] - NODE[:2]) @ (cos(NODE[2]), np.sin(NODE[2])) < 0
-    assert 0.1 < behind.mean() < 0.9
 
 
 def test_no_pose_where_the_tree_is_or_the_heatmap_is_zero() -> None:
@@ -101,5 +94,5 @@ def test_poses_off_the_map_are_not_proposed() -> None:
 
 def test_a_tree_without_nodes_has_no_extension() -> None:
     heatmap = Heatmap.uniform(GRID)
-    extension = TreeExtension(heatmap, RADIUS, RANGE, None, np.random.default_rng(0))
+    extension = TreeExtension(heatmap, RADIUS, RANGE, np.random.default_rng(0))
     assert extension.propose(bytearray(SIDE * SIDE)) is None
