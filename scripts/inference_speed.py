@@ -4,8 +4,10 @@
 
 The models take turns on the same tasks, on random maps of each size. ``first`` is a prediction on a
 map that is new, with the labels of its parts and its scaled copy; ``next`` one for another task on
-it; ``of 64`` a task of 64 in one call; all with repair. Times are those of the processor (one
-thread, so that other work does not count), medians over the tasks, in milliseconds.
+it; ``of 64`` a task of 64 in one call; all with repair. ``attach`` is that of the next heat map to
+RRT*. Times are those of the processor (one thread, so that other work does not count), medians over
+the tasks, in milliseconds. ``memory`` is how much more of it the process has at the most while the
+first prediction is made, in MB, the largest over the maps.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from __future__ import annotations
 import argparse
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 from time import process_time
 from typing import Any
 
@@ -20,13 +23,17 @@ import numpy as np
 from numpy.typing import NDArray
 from search_speed import GENERATORS
 
-from cbagan_ompl import GridMap, Predictor, load_model
+from cbagan_ompl import GridMap, Predictor, attach, load_model
 from cbagan_ompl.common.files import write_json
 from cbagan_ompl.common.markdown import table
 from cbagan_ompl.inference.bundled_models import bundled_model
 from cbagan_ompl.map_generators import MAP_GENERATORS
+from cbagan_ompl.planning.compat import og
+from cbagan_ompl.planning.problem import make_setup
+from cbagan_ompl.planning.workspace import Workspace
 
-COLUMNS = ("first", "next", "of 64")
+TIMES = ("first", "next", "of 64", "attach")
+COLUMNS = (*TIMES, "memory")
 BATCH = 64
 
 
@@ -48,20 +55,50 @@ def main() -> None:
 def measure(models: Mapping[str, Predictor], size: int) -> dict[str, dict[str, float]]:
     """Return the medians of all models on maps of a size."""
     times: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
+    memory: dict[str, float] = defaultdict(float)
     for free, tasks in random_tasks(size):
         starts, goals = tasks[:, 0], tasks[:, 1]
         for name, model in models.items():
             grid = GridMap(free)
+            before = forget_peak()
             times[name]["first"].append(seconds(model.predict, grid, starts[0], goals[0]))
+            memory[name] = max(memory[name], status("VmHWM") - before)
             for start, goal in tasks[1:6]:
                 times[name]["next"].append(seconds(model.predict, grid, start, goal))
+                times[name]["attach"].append(attach_seconds(model, grid, start, goal))
             if size == min(model.record["working_size"], size):
                 duration = seconds(model.predict_many, grid, starts, goals)
                 times[name]["of 64"].append(duration / BATCH)
     return {
         name: {column: 1e3 * float(np.median(values)) for column, values in rows.items()}
+        | {"memory": memory[name]}
         for name, rows in times.items()
     }
+
+
+def attach_seconds(
+    model: Predictor, grid: GridMap, start: NDArray[np.float64], goal: NDArray[np.float64]
+) -> float:
+    """Return how long it takes to attach a heat map to RRT*."""
+    heatmap = model.predict(grid, start, goal)
+    setup = make_setup(Workspace(grid), np.stack((start, goal)), 1.0)
+    setup.setPlanner(og.RRTstar(setup.getSpaceInformation()))
+    begin = process_time()
+    with attach(setup, heatmap, seed=0):
+        return process_time() - begin
+
+
+def forget_peak() -> float:
+    """Forget the most memory that the process has had; return what it has now, MB."""
+    Path("/proc/self/clear_refs").write_text("5")
+    return status("VmRSS")
+
+
+def status(name: str) -> float:
+    """Return an entry of the process's status as Linux tells it, MB."""
+    lines = Path("/proc/self/status").read_text().splitlines()
+    entry = next(line for line in lines if line.startswith(f"{name}:"))
+    return int(entry.split()[1]) / 1024
 
 
 def random_tasks(size: int) -> Iterator[tuple[NDArray[np.bool_], NDArray[np.float64]]]:
@@ -84,7 +121,12 @@ def seconds(function: Callable[..., object], *arguments: Any) -> float:
 def speed_table(result: Mapping[str, Any]) -> str:
     """Return the figures as a table of Markdown."""
     rows = [
-        (f"{size} px", name, *(f"{row[c]:.2f}" if c in row else "" for c in COLUMNS))
+        (
+            f"{size} px",
+            name,
+            *(f"{row[column]:.2f}" if column in row else "" for column in TIMES),
+            f"{row['memory']:.0f} MB",
+        )
         for size, models in result["sizes"].items()
         for name, row in models.items()
     ]

@@ -19,7 +19,7 @@ from inference_speed import speed_table as speed_of_models
 from planner_tables import Json, ratios_table
 from robot_tables import car_suites, robot_paths
 from search_speed import speed_table
-from study_tables import control, overlap
+from study_tables import control, overlap, paper_networks, spread
 from suite_tables import (
     ROOT,
     VERSIONS,
@@ -166,11 +166,6 @@ def ablation() -> str:
         rows.append([name, str(len(runs)), ious, difference, f"{dice:.4f}", f"{100 * least:.1f} %"])
     header = ["network", "seeds", "IoU", "difference from the whole", "Dice"]
     return table([*header, "connected (8), least"], rows)
-
-
-def spread(interval: list[float], form: str) -> str:
-    mean, low, high = interval
-    return f"{mean:{form}} ({low:{form}} to {high:{form}})"
 
 
 def refinement() -> str:
@@ -348,6 +343,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "regions": regions,
     "label_noise": label_noise,
     "networks": networks,
+    "paper_networks": paper_networks,
     "paper_tables": paper_tables,
     "replanning": replanning,
     "calibration": lambda: calibration_table(read("calibration.json")),

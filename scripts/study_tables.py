@@ -1,4 +1,4 @@
-"""The tables of planning with controls and of overlapped inference, as Markdown."""
+"""The tables of planning with controls, of overlapped inference and of the paper's networks."""
 
 from __future__ import annotations
 
@@ -49,3 +49,32 @@ def overlap() -> str:
             rows.append([name, row["planner"], row["way"], *cells, ratio, arrival])
     header = ["maps, OMPL", "planner", "heat map", "solved", "first path", "ratio", "arrival"]
     return table(header, rows)
+
+
+def paper_networks() -> str:
+    """Return the scores of the paper's networks, trained with its recipe."""
+    names = {
+        "cbagan": "CBAGAN: both kinds of attention",
+        "sa": "spatial attention alone",
+        "ca": "channel attention alone",
+        "none": "no attention",
+        "sagan": "SAGAN: self-attention",
+        "segmentation": "CBAGAN without discriminators",
+    }
+    rows = []
+    for key, name in names.items():
+        row = read("paper_networks.json")["networks"][key]
+        means = [f"{row[score][0]:.3f}" for score in ("dice", "right_pixels")]
+        connected = f"{100 * row['connectivity'][0]:.1f} %"
+        nodes = [spread(row[f"{way}_nodes_ratio"], ".2f") for way in ("plain", "adapted")]
+        inference = sorted(run["plain"]["inference_ms"][0] for run in row["seeds"])
+        times = [f"{inference[len(inference) // 2]:.1f} ms", f"{row['epoch_s'] / 3:.0f} min"]
+        rows.append([name, spread(row["iou"], ".3f"), *means, connected, *nodes, *times])
+    header = ["network", "IoU", "Dice", "right pixels", "connected (8)", "RRT nodes, not adapted"]
+    return table([*header, "RRT nodes, adapted", "inference", "training"], rows)
+
+
+def spread(interval: list[float], form: str) -> str:
+    """Return a mean with the ends of its interval."""
+    mean, low, high = interval
+    return f"{mean:{form}} ({low:{form}} to {high:{form}})"

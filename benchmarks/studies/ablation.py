@@ -14,19 +14,15 @@ differences from the whole network with the same seed. Intervals are Student's, 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import t
-from train_networks import is_complete
+from trainings import run_scores, student_interval
 
 from cbagan_ompl.common.files import write_json
 from cbagan_ompl.datasets.synthetic import SyntheticSettings
-from cbagan_ompl.training.checkpoints import load_checkpoint
-from cbagan_ompl.training.config import BEST, LAST, TrainingConfig
-from cbagan_ompl.training.loop import train
+from cbagan_ompl.training.config import TrainingConfig
 from cbagan_ompl.training.task_sources import SyntheticSchedule, synthetic_source
 
 NO_ATTENTION = {"channel_attention": False, "spatial_attention": False}
@@ -57,11 +53,8 @@ def main() -> None:
         for name, changes in VARIANTS.items():
             config = recipe.updated({"seed": seed, **changes})
             folder = args.output / f"{name.replace(' ', '-')}-{seed}"
-            if not is_complete(folder):
-                with synthetic_source(SyntheticSettings(), schedule) as source:
-                    resume = (folder / LAST).exists()
-                    train(source, config, folder, resume=resume, device=args.device)
-            scores[name].append(load_checkpoint(folder / BEST)["test"])
+            source = synthetic_source(SyntheticSettings(), schedule)
+            scores[name].append(run_scores(folder, config, source, args.device))
             print(f"{name}, seed {seed}: IoU {scores[name][-1]['iou']:.4f}", flush=True)
     if args.json is not None:
         settings = {"epochs": args.epochs, "maps": args.maps, "held_out": args.held_out}
@@ -74,17 +67,10 @@ def summarize(scores: dict[str, list[dict[str, float]]]) -> dict[str, Any]:
     result = {}
     for name, runs in scores.items():
         ious = [run["iou"] for run in runs]
-        result[name] = {"seeds": runs, "iou": interval(ious)}
+        result[name] = {"seeds": runs, "iou": student_interval(ious)}
         if name != WHOLE:
-            result[name]["difference"] = interval(np.subtract(ious, whole).tolist())
+            result[name]["difference"] = student_interval(np.subtract(ious, whole).tolist())
     return result
-
-
-def interval(values: Sequence[float]) -> list[float]:
-    """Return the mean and the ends of Student's interval of 95 %."""
-    mean, spread = float(np.mean(values)), float(np.std(values, ddof=1))
-    half = float(t.ppf(0.975, len(values) - 1)) * spread / len(values) ** 0.5
-    return [mean, mean - half, mean + half]
 
 
 if __name__ == "__main__":

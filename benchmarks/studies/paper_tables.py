@@ -6,7 +6,8 @@
 DATASET is the folder of the published (map, point, ROI) set. First RRT runs many times on three
 tasks: of the first three of the ten original maps (maps 0, 10 and 20) the first task in test.csv
 whose straight line is blocked. Then it runs once on every test task. The samplers take turns, with
-the same parameters and seeds. Planning times exclude inference, which is given apart.
+the same parameters and seeds: OMPL's own, and each model with the adaptation and, as the paper
+samples, without. Planning times exclude inference, which is given apart.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from cbagan_ompl import GridMap, Predictor, load_model, plan
+from cbagan_ompl import Adaptation, GridMap, Predictor, load_model, plan
 from cbagan_ompl.common.files import write_json
 from cbagan_ompl.datasets.dataset import Dataset, Tasks, load_dataset
 from cbagan_ompl.planning.compat import ompl_version
@@ -29,7 +30,10 @@ ITERATIONS = 5000  # the paper's
 COPIES = 10  # maps from each original
 MEASURES = ("nodes", "planning_ms", "inference_ms", "total_ms")
 
+PLAIN = ", not adapted"
+
 Runs = dict[str, NDArray[np.float64]]
+Samplers = dict[str, dict[str, Any]]
 
 
 def main() -> None:
@@ -41,7 +45,9 @@ def main() -> None:
     parser.add_argument("--json", metavar="FILE")
     args = parser.parse_args()
     models = dict(text.split("=", 1) for text in args.model)
-    predictors = {"uniform": None, **{name: load_model(file) for name, file in models.items()}}
+    samplers: Samplers = {"uniform": {"sampler": "uniform"}}
+    for name, file in models.items():
+        samplers |= samplers_of(name, load_model(file))
     dataset = load_dataset(args.dataset)
     tasks = dataset.test
 
@@ -55,9 +61,9 @@ def main() -> None:
     for i in three_tasks(dataset):
         jobs = [(i, seed) for seed in range(args.runs)]
         name = f"map {dataset.map_numbers[tasks.map_of[i]]}, test task {i}"
-        result["maps"][name] = summary(run_all(tasks, jobs, predictors))
+        result["maps"][name] = summary(run_all(tasks, jobs, samplers))
     jobs = [(i, i) for i in range(len(tasks))[: args.tasks]]
-    result["all_test_tasks"] = {"tasks": len(jobs), **summary(run_all(tasks, jobs, predictors))}
+    result["all_test_tasks"] = {"tasks": len(jobs), **summary(run_all(tasks, jobs, samplers))}
     print_tables(result)
     if args.json is not None:
         write_json(args.json, result)
@@ -78,31 +84,40 @@ def straight_line_is_free(tasks: Tasks, i: int) -> bool:
     return GridMap(tasks.free[i]).path_is_free(endpoints)
 
 
-def run_all(
-    tasks: Tasks, jobs: list[tuple[int, int]], predictors: dict[str, Predictor | None]
-) -> dict[str, Runs]:
+def samplers_of(name: str, model: Predictor) -> Samplers:
+    """Return the samplers of a model, with the adaptation and, as the paper samples, without."""
+    return {
+        name: {"model": model},
+        f"{name}{PLAIN}": {"model": model, "adaptation": Adaptation.of(())},
+    }
+
+
+def run_all(tasks: Tasks, jobs: list[tuple[int, int]], samplers: Samplers) -> dict[str, Runs]:
     """Return the measures of every sampler for every (task, seed), shape (jobs,).
 
     Runs without a path have NaN.
+
+    Args:
+        tasks: of the data set.
+        jobs: numbers of tasks, with seeds.
+        samplers: arguments of ``plan``, by the names of the rows.
     """
-    rows: dict[str, list[list[float]]] = {name: [] for name in predictors}
-    names = list(predictors)
+    rows: dict[str, list[list[float]]] = {name: [] for name in samplers}
+    names = list(samplers)
     grids = {i: GridMap(tasks.free[i]) for i, _ in jobs}
     for turn, (i, seed) in enumerate(tqdm(jobs)):
         first = turn % len(names)
         for name in names[first:] + names[:first]:
-            predictor = predictors[name]
             run = plan(
                 grids[i],
                 tasks.start[i],
                 tasks.goal[i],
                 planner="RRT",
-                sampler="uniform" if predictor is None else "learned",
-                model=predictor,
                 range=RANGE,
                 iterations=ITERATIONS,
                 time=10,
                 seed=seed,
+                **samplers[name],
             )
             seconds = (run.planning_s, run.inference_s, run.total_s)
             row = [run.nodes, *(1000 * s for s in seconds)]

@@ -10,15 +10,16 @@ its own; complete runs are not repeated, an interrupted one is resumed.
 from __future__ import annotations
 
 import argparse
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from trainings import run_scores
+
 from cbagan_ompl.common.files import write_json
 from cbagan_ompl.datasets.dataset import load_dataset
-from cbagan_ompl.training.checkpoints import load_checkpoint
-from cbagan_ompl.training.config import BEST, LAST, TrainingConfig
-from cbagan_ompl.training.loop import train
+from cbagan_ompl.training.config import TrainingConfig
 from cbagan_ompl.training.task_sources import DatasetSource
 
 SEEDS = {"cbagan": (0, 1, 2), "sa": (0,), "ca": (0,), "none": (0,), "sagan": (0, 1, 2)}
@@ -38,20 +39,12 @@ def main() -> None:
         for seed in seeds:
             config = replace(TrainingConfig().with_network(network), epochs=args.epochs, seed=seed)
             folder = args.output / f"{network}-{seed}"
-            if not is_complete(folder):
-                resume = (folder / LAST).exists()
-                source = DatasetSource(dataset, config.validation_fraction, config.seed)
-                train(source, config, folder, resume=resume, device=args.device)
-            scores = load_checkpoint(folder / BEST)["test"]
+            source = DatasetSource(dataset, config.validation_fraction, config.seed)
+            scores = run_scores(folder, config, nullcontext(source), args.device)
             print(f"{network}, seed {seed}: IoU {scores['iou']:.4f}, Dice {scores['dice']:.4f}")
             result["test"].setdefault(network, {})[str(seed)] = scores
     if args.json is not None:
         write_json(args.json, result)
-
-
-def is_complete(folder: Path) -> bool:
-    """Return whether a run is complete: at its end it adds the scores on the test tasks."""
-    return (folder / BEST).exists() and "test" in load_checkpoint(folder / BEST)
 
 
 if __name__ == "__main__":

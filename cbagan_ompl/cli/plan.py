@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ..common.outputs import check_output, write_report
+from ..common.outputs import check_distinct, check_output, write_report
 from ..errors import ConfigError
 from ..maps.grid_map import GridMap
 from ..maps.loading import bundled_maps
@@ -146,6 +146,7 @@ def _plan(args: argparse.Namespace) -> int:
         from ..common.figures import check_figure_path
 
         check_figure_path(args.output)
+    check_distinct(args.json, args.csv, args.output)
     for file in (args.output, args.csv):
         check_output(file, input_files(args), force=args.force)
     grid = GridMap.load(args.map, **map_options(args))

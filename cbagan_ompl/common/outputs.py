@@ -53,6 +53,26 @@ def check_output(
         )
 
 
+def check_distinct(*paths: str | None) -> None:
+    """Raise if two outputs of a command are one file.
+
+    Args:
+        *paths: of the files; None for those that are not wanted.
+
+    Raises:
+        ConfigError: two of them are the same.
+
+    Example:
+        >>> check_distinct("path.csv", None, None, "path.png")
+    """
+    seen = set()
+    for path in filter(None, paths):
+        file = os.path.realpath(path)
+        if file in seen:
+            raise ConfigError(f"cannot write {path} twice: give each output a name of its own")
+        seen.add(file)
+
+
 def write_report(path: str, values: Mapping[str, Any]) -> None:
     """Write values as JSON, with a first entry that says what wrote them.
 

@@ -318,7 +318,7 @@ def _parse_record(path: Path, text: bytes) -> dict[str, Any]:
     if type(schema) is int and schema > RECORD_SCHEMA:
         raise ModelError(
             f"{path}: the model's record has version {show(schema)}, this package understands up "
-            f"to {RECORD_SCHEMA}; install a newer cbagan-ompl (pip install -U cbagan-ompl)"
+            f"to {RECORD_SCHEMA}; install a newer cbagan-ompl (git pull in the clone)"
         )
     wrong = [
         name

@@ -202,10 +202,21 @@ def _describe_blocked(grid: GridMap, position: NDArray[np.float64]) -> str:
     column, row = np.floor(grid.to_pixel(position)).astype(int).tolist()
     name, was_free = grid.bare
     if was_free[row, column]:
-        return f"too close to an obstacle of {name} for the robot's radius"
-    if grid.unknown is not None and grid.unknown[row, column]:
-        return f"in unknown space of {name}"
-    return f"in an obstacle of {name}"
+        kind = name_blocked(grid, *_find_nearest_blocked(was_free, row, column))
+        return f"too close to {kind} of {name} for the robot's radius"
+    return f"in {name_blocked(grid, row, column)} of {name}"
+
+
+def _find_nearest_blocked(free: NDArray[np.bool_], row: int, column: int) -> tuple[int, int]:
+    rows, columns = np.nonzero(~free)
+    nearest = int(np.argmin(np.hypot(rows - row, columns - column)))
+    return int(rows[nearest]), int(columns[nearest])
+
+
+def name_blocked(grid: GridMap, row: int, column: int) -> str:
+    """Return what is in a blocked pixel, for messages."""
+    is_unknown = grid.unknown is not None and grid.unknown[row, column]
+    return "unknown space" if is_unknown else "an obstacle"
 
 
 def _format(point: NDArray[np.float64]) -> str:

@@ -116,7 +116,7 @@ class GridMap:
 
         Args:
             data: -1 (unknown) or 0 to 100 (percent) for each cell, row by row from the bottom, as
-                in the message, (width * height,).
+                in the message, (width * height,) or (height, width); masked is unknown.
             width: columns.
             height: rows.
             resolution: metres per cell.
@@ -154,7 +154,8 @@ class GridMap:
         """Make the map of a costmap_2d.
 
         Args:
-            array: (H, W), costs from 0 to 255, row 0 at the bottom, as the costmap has them.
+            array: (H, W), costs from 0 to 255, row 0 at the bottom, as the costmap has them;
+                masked is unknown.
             resolution: metres per cell.
             origin: pose (x, y, yaw) of the lower left corner, metres and radians.
             lethal: cells of this cost and more are blocked: by default those within the robot's

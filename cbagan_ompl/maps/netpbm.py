@@ -66,7 +66,11 @@ def decode_netpbm(
     levels: NDArray[Any]
     if number in (5, 6):
         # Two bytes a value, high byte first, from level 256; a last odd byte is not looked at.
-        body = memoryview(data)[header.end() :]
+        begin, needed = header.end(), count * stored.itemsize
+        # One blank ends the header, but in a file with lines of Windows two bytes do.
+        if data[begin - 1 : begin + 1] == b"\r\n" and len(data) == begin + 1 + needed:
+            begin += 1
+        body = memoryview(data)[begin:]
         found = min(count, len(body) // stored.itemsize)
         levels = np.frombuffer(body, stored, count=found).astype(
             stored.newbyteorder("="), copy=False

@@ -9,6 +9,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -32,7 +34,8 @@ def read_occupancy_grid(
     """Read the fields of a nav_msgs/OccupancyGrid.
 
     Args:
-        data: -1 or 0 to 100 for each cell, row by row from the bottom, (width * height,).
+        data: -1 or 0 to 100 for each cell, row by row from the bottom, (width * height,) or
+            (height, width). What is masked is unknown.
         width: columns.
         height: rows.
         resolution: metres per cell.
@@ -42,13 +45,18 @@ def read_occupancy_grid(
         name: of the map.
 
     Raises:
-        MapError: the number of values is not width * height, or one lies outside -1 to 100.
+        MapError: the values are not width * height, or one lies outside -1 to 100.
         ConfigError: a size or threshold that makes no sense.
     """
     columns, rows = whole_number("width", width, 1), whole_number("height", height, 1)
     check_map_size(columns, rows, name)
     check_fraction("free_thresh", free_thresh)
-    cells = _whole_values(data, name, -1, 100)
+    cells = _whole_values(data, name, -1, 100, _UNKNOWN_OCCUPANCY)
+    if cells.ndim > 1 and cells.shape != (rows, columns):
+        raise MapError(
+            f"{name}: the values of an occupancy grid of {columns} x {rows} cells are a list or "
+            f"an array of shape {(rows, columns)}, these have shape {cells.shape}"
+        )
     if cells.size != columns * rows:
         raise MapError(
             f"{name}: an occupancy grid of {columns} x {rows} cells has {columns * rows} values, "
@@ -56,7 +64,9 @@ def read_occupancy_grid(
         )
     cells = cells.reshape(rows, columns)[::-1]
     unknown = cells == _UNKNOWN_OCCUPANCY
-    free = (cells <= 100 * free_thresh) & ~unknown
+    # In a table, of which unknown is the last: 0.29 is 29 / 100, but 100 * 0.29 is below 29.
+    is_free = np.append(np.arange(101) / 100 <= free_thresh, False)
+    free = is_free[cells]
     return _raw_map(free, unknown, unknown_is_free, resolution, origin, name)
 
 
@@ -71,7 +81,7 @@ def read_costmap(
     """Read the costs of a costmap_2d; see :meth:`cbagan_ompl.GridMap.from_costmap`.
 
     Args:
-        array: (H, W), costs from 0 to 255, row 0 at the bottom.
+        array: (H, W), costs from 0 to 255, row 0 at the bottom. What is masked is unknown.
         resolution: metres per cell.
         origin: pose (x, y, yaw) of the lower left corner.
         lethal: cells of this cost and more are blocked.
@@ -83,7 +93,7 @@ def read_costmap(
         ConfigError: ``lethal`` is no cost.
     """
     least = whole_number("lethal", lethal, 1, 255)
-    costs = _whole_values(array, name, 0, 255)
+    costs = _whole_values(array, name, 0, 255, _UNKNOWN_COST)
     if costs.ndim != 2:
         raise MapError(f"{name}: a costmap is a 2-D array (H, W), this one has shape {costs.shape}")
     check_map_size(costs.shape[1], costs.shape[0], name)
@@ -92,10 +102,13 @@ def read_costmap(
     return _raw_map((costs < least) & ~unknown, unknown, unknown_is_free, resolution, origin, name)
 
 
-def _whole_values(values: ArrayLike, name: str, low: int, high: int) -> NDArray[np.int16]:
+def _whole_values(
+    values: ArrayLike, name: str, low: int, high: int, unknown: int
+) -> NDArray[np.int16]:
     try:
-        array = np.asarray(values)
-    except ValueError as error:  # rows of different lengths
+        filled: Any = np.ma.filled(values, unknown)
+        array = np.asarray(filled)
+    except (ValueError, TypeError) as error:  # rows of different lengths; a mask on unsigned values
         raise MapError(f"{name}: the values are no array: {error}") from error
     if array.dtype.kind not in "iu" or array.size == 0:
         raise MapError(f"{name}: the values are whole numbers, got an array of {array.dtype}")

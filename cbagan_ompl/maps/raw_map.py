@@ -86,6 +86,10 @@ def check_cells(free: ArrayLike, name: str) -> NDArray[np.bool_]:
             f"this one has shape {cells.shape}"
         )
     check_map_size(cells.shape[1], cells.shape[0], name)
+    if np.ma.is_masked(free):
+        raise MapError(
+            f"{name}: masked cells are neither free nor blocked: say which with .filled(False)"
+        )
     if cells.dtype.kind not in "buif":
         raise MapError(f"{name}: a map holds booleans or numbers, not {cells.dtype}")
     if cells.dtype.kind == "f" and not np.isfinite(cells).all():

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import re
 from itertools import pairwise
+from math import ceil, floor
 from pathlib import Path
 from typing import Any
 from xml.parsers import expat
@@ -29,6 +30,9 @@ Points = NDArray[np.float64]
 MAX_SVG_BYTES = 2**22
 MAX_POINTS = 100_000
 
+# Most rows of pixels that polygons lie in, over all polygons: about a second.
+_MAX_ROWS = 10_000_000
+
 _SVG = "http://www.w3.org/2000/svg"
 # Elements that hold no drawing of their own, or none that is shown.
 _IGNORED = frozenset({"defs", "metadata", "title", "desc", "style", "symbol", "marker", "clipPath"})
@@ -37,8 +41,9 @@ _CONTAINERS = frozenset({"svg", "g"})
 # The convex hull stands for a path; it may be larger by this fraction, for rounded corners.
 _HULL_EXCESS = 0.05
 
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_TOKEN = re.compile(rf"\s*,?\s*([A-Za-z]|{_NUMBER})")
+# Each text fits them in one way only: what does not fit costs no time to take back.
+_NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?"
+_TOKEN = re.compile(rf"\s*(?:,\s*)?([A-Za-z]|{_NUMBER})")
 _TRANSLATE = re.compile(rf"\s*translate\(\s*({_NUMBER})(?:[\s,]+({_NUMBER}))?\s*\)\s*")
 
 # Slack for rounding, in pixels: a pixel that a polygon touches is blocked.
@@ -68,10 +73,19 @@ def read_svg_map(path: Path, *, resolution: float, margin: float) -> RawMap:
         raise MapError(f"{path}: the resolution {resolution:g} is too fine for this drawing")
     width, height = (max(int(side), 1) for side in size)
     check_map_size(width, height, str(path))
-    free = np.ones((height, width), np.bool_)
+    if sum(np.ptp(polygon[:, 1]) for polygon in polygons) / resolution > _MAX_ROWS:
+        raise MapError(
+            f"{path}: the {len(polygons)} polygons lie in more than {_MAX_ROWS} rows of pixels in "
+            f"all; the resolution {resolution:g} is too fine for them"
+        )
+    # By how much each pixel lies in more polygons than the one before it in its row.
+    changes = np.zeros((height, width + 1), np.uint16)
     for polygon in polygons:
         # Row 0 is on top.
-        _block(free, ((polygon - low) / resolution - (0, height)) * (1, -1))
+        _cover(changes, ((polygon - low) / resolution - (0, height)) * (1, -1))
+    free = np.empty((height, width), np.bool_)
+    for row in range(height):
+        free[row] = np.cumsum(changes[row, :-1], dtype=np.uint16) == 0
     if not free.any():
         raise MapError(f"{path}: the polygons leave no pixel free; try a margin around them")
     return RawMap(free, path.stem, resolution, (float(low[0]), float(low[1]), 0.0))
@@ -97,7 +111,9 @@ def read_svg_polygons(path: Path, error_class: type[CbaganOmplError]) -> list[Po
     parser.EndElementHandler = drawing.end
     try:
         parser.Parse(data, True)
-    except expat.ExpatError as error:
+    except CbaganOmplError:
+        raise
+    except Exception as error:  # also whatever Python raises for odd encodings
         raise error_class(f"{path}: no valid XML: {error}") from error
     if not drawing.polygons:
         raise error_class(f"{path}: there is no path in this SVG file")
@@ -200,9 +216,7 @@ def _path_commands(description: str) -> list[tuple[str, list[float]]]:
     text = description.strip()
     commands: list[tuple[str, list[float]]] = []
     position = 0
-    for match in _TOKEN.finditer(text):
-        if match.start() != position:
-            break
+    while match := _TOKEN.match(text, position):
         position = match.end()
         if match[1].isalpha():
             commands.append((match[1], []))
@@ -216,33 +230,48 @@ def _path_commands(description: str) -> list[tuple[str, list[float]]]:
 
 
 def _convex_hull(points: Points) -> Points:
-    # OpenCV computes in single precision: of indices alone, near the origin.
-    near = (points - points.mean(axis=0)).astype(np.float32)
-    indices = cv2.convexHull(near, returnPoints=False)
+    # OpenCV computes in single precision: of indices alone, near the origin and not too small.
+    near = points - points.mean(axis=0)
+    indices = cv2.convexHull(
+        (near / (np.abs(near).max() or 1.0)).astype(np.float32), returnPoints=False
+    )
     return np.asarray(points[indices.ravel()])
 
 
 def _area(points: Points) -> float:
-    x, y = (points - points[0]).T
-    return abs(float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))) / 2
+    x, y = (points - points[0]).T  # the first one is (0, 0), and so is its product with the last
+    return abs(float(x[:-1] @ y[1:] - x[1:] @ y[:-1])) / 2
 
 
-def _block(free: NDArray[np.bool_], polygon: Points) -> None:
-    """Block every pixel that a convex polygon touches; (N, 2), pixels."""
-    height, width = free.shape
+def _cover(changes: NDArray[np.uint16], polygon: Points) -> None:
+    """Count the pixels that a convex polygon touches.
+
+    Args:
+        changes: (H, W + 1), how many polygons more than in the column before touch a pixel.
+        polygon: (N, 2), pixels.
+    """
+    height, width = changes.shape[0], changes.shape[1] - 1
     first = max(int(np.floor(polygon[:, 1].min() - _ROUNDING)), 0)
     last = min(int(np.floor(polygon[:, 1].max() + _ROUNDING)), height - 1)
-    for row in range(first, last + 1):
-        columns = []
-        for (u0, v0), (u1, v1) in pairwise([*polygon.tolist(), polygon[0].tolist()]):
-            low, high = sorted((v0, v1))
-            top, bottom = max(low, row - _ROUNDING), min(high, row + 1 + _ROUNDING)
-            if top <= bottom:
-                slope = (u1 - u0) / (v1 - v0) if v1 != v0 else 0.0
-                columns += [u0 + (top - v0) * slope, u0 + (bottom - v0) * slope]
-                if v1 == v0:
-                    columns += [u0, u1]
-        if columns:
-            left = max(int(np.floor(min(columns) - _ROUNDING)), 0)
-            right = min(int(np.floor(max(columns) + _ROUNDING)), width - 1)
-            free[row, left : right + 1] = False
+    left = np.full(last - first + 1, np.inf)
+    right = -left
+    for (u0, v0), (u1, v1) in pairwise([*polygon.tolist(), polygon[0].tolist()]):
+        low, high = sorted((v0, v1))
+        begin = max(ceil(low - 1 - _ROUNDING), first)
+        end = min(floor(high + _ROUNDING), last) + 1
+        rows = np.arange(begin, end)
+        crossed = slice(begin - first, end - first)
+        slope = (u1 - u0) / (v1 - v0) if v1 != v0 else 0.0
+        columns = [
+            u0 + (np.maximum(low, rows - _ROUNDING) - v0) * slope,
+            u0 + (np.minimum(high, rows + 1 + _ROUNDING) - v0) * slope,
+            *([u1] if v1 == v0 else []),
+        ]
+        for column in columns:
+            left[crossed] = np.minimum(left[crossed], column)
+            right[crossed] = np.maximum(right[crossed], column)
+    begins = np.maximum(np.floor(left - _ROUNDING), 0).astype(np.intp)
+    ends = np.minimum(np.floor(right + _ROUNDING), width - 1).astype(np.intp) + 1
+    rows = np.arange(first, last + 1)
+    changes[rows, begins] += np.uint16(1)
+    changes[rows, ends] -= np.uint16(1)

@@ -138,9 +138,10 @@ def task_files(path: str | os.PathLike[str]) -> list[Path]:
 def _scen_tasks(path: Path, grid: GridMap) -> list[Task]:
     tasks = []
     for scenario in read_scenarios(path):
-        # A scaled map may be a pixel off in one of its sides.
+        # A scaled map may be a pixel off in one of its sides, where the other one is scaled.
         skew = grid.width * scenario.height - grid.height * scenario.width
-        if abs(skew) > max(scenario.width, scenario.height):
+        is_scaled = grid.width != scenario.width and grid.height != scenario.height
+        if abs(skew) > max(scenario.width, scenario.height) * is_scaled:
             raise MapError(
                 f"{path}: made for a map of {scenario.width} x {scenario.height} cells, "
                 f"{grid.name} has {grid.width} x {grid.height} pixels: sizes in other proportions, "

@@ -167,8 +167,8 @@ def attach(
     whose goal was replaced meanwhile raises an error. Planners other than the attached one get the
     goal itself, also while it is attached. Until :meth:`Attachment.detach` the setup, the planner
     and the heat map keep each other alive; where nothing else refers to them any more, they are let
-    go by the next ``attach`` or by Python's garbage collector. That does not see references through
-    OMPL: if a validity checker refers to its own setup, or an attribute of the setup to the
+    go by the next ``attach``, or when another attached setup solves. References through OMPL cannot
+    be seen: if a validity checker refers to its own setup, or an attribute of the setup to the
     attachment, only ``detach`` lets go of them.
 
     Args:

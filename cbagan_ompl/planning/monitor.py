@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import atexit
-import gc
 import sys
-import weakref
 from math import inf
 from threading import get_ident
 from time import perf_counter
@@ -34,9 +32,10 @@ class PlannerMonitor:
     """The state of a planner, read through the only references that callbacks have to it.
 
     A callback that refers to its planner closes a reference cycle through C++, which no garbage
-    collector sees. :meth:`release` cuts it: when the planner is detached, when nobody else refers
-    to the planner and its setup any more (:func:`release_forgotten`), and at interpreter exit,
-    because OMPL 2.0 reports every object that is left.
+    collector sees. :meth:`release` cuts it: when the planner is detached, when another one is
+    attached or solves and nobody else refers to this one and its setup any more
+    (:func:`release_forgotten`), and at interpreter exit, because OMPL 2.0 reports every object
+    that is left.
 
     Attributes:
         injected_fraction: fraction of the planner's samples that it asks the goal for.
@@ -84,7 +83,7 @@ class PlannerMonitor:
         Args:
             caller: the frame that wants to know; it has called Python, not OMPL.
         """
-        if any(watch.is_solving for watch in self._watches):
+        if self._is_solving:
             return True
         if self._call is None or self._problem.getSolutionCount() != self._paths_at_call:
             return False
@@ -96,6 +95,10 @@ class PlannerMonitor:
                     return True
                 frame = frame.f_back
         return False
+
+    @property
+    def _is_solving(self) -> bool:
+        return any(watch.is_solving for watch in self._watches)
 
     @property
     def has_planned(self) -> bool:
@@ -175,11 +178,15 @@ class PlannerMonitor:
         Args:
             awaited: the heat map that is waited for, whose failure a solve raises at its end.
         """
-        _alive.add(self)
+        _attached.add(self)
         self._awaited = awaited
         targets = [one for one in (self._setup, self._planner) if hasattr(one, "solve")]
         after = _do_nothing if awaited is None else awaited.raise_failure
-        self._watches = [SolveWatch(target, self.check_goal, after) for target in targets]
+        self._watches = [SolveWatch(target, self._begin_solve, after) for target in targets]
+
+    def _begin_solve(self) -> None:
+        release_forgotten()
+        self.check_goal()
 
     def check_goal(self) -> None:
         """Raise if the goal was replaced: the planner would sample nothing but the new one.
@@ -205,6 +212,7 @@ class PlannerMonitor:
         # Each count includes the argument of the call. The setup holds the planner.
         return (
             self._setup is not None
+            and not self._is_solving
             and sys.getrefcount(self._setup) <= 2 + self._watch_references(self._setup)
             and sys.getrefcount(self._planner) <= 3 + self._watch_references(self._planner)
         )
@@ -226,6 +234,7 @@ class PlannerMonitor:
             self._awaited.release()
         self._planner = self._problem = self._goal = self._setup = self._call = None
         self._cost = self.injected_goal = None
+        _attached.discard(self)
 
     def _endpoints(self) -> InformedSet:
         starts, goals = np.array(self._starts()), np.array(self._goals())
@@ -279,12 +288,16 @@ def is_informed(planner: Any) -> bool:
 
 def is_monitored(planner: Any) -> bool:
     """Return whether callbacks refer to a planner at the moment."""
-    return any(monitor.refers_to(planner) for monitor in _alive)
+    return any(monitor.refers_to(planner) for monitor in _attached.copy())
 
 
 def release_forgotten() -> None:
-    """Let go of the planners that nobody can use any more: their setups are forgotten."""
-    for monitor in list(_alive):
+    """Let go of the planners that nobody can use any more: their setups are forgotten.
+
+    Python's garbage collector would be the place for it, but an interrupt that arrives in one of
+    its callbacks is lost.
+    """
+    for monitor in _attached.copy():
         if monitor.is_forgotten():
             monitor.release()
 
@@ -293,19 +306,12 @@ def _do_nothing() -> None:
     pass
 
 
-_alive: weakref.WeakSet[PlannerMonitor] = weakref.WeakSet()
-
-
-def _collect(phase: str, info: dict[str, int]) -> None:
-    """Do for cycles through C++ what Python's garbage collector does for others."""
-    if phase == "stop" and info["generation"] == 2:
-        release_forgotten()
-
-
-gc.callbacks.append(_collect)
+# Monitors that are registered and not released. No weak set: an interrupt that arrives while
+# Python removes a dead element from it is lost, too.
+_attached: set[PlannerMonitor] = set()
 
 
 @atexit.register
 def _release_all() -> None:
-    for monitor in list(_alive):
+    for monitor in _attached.copy():
         monitor.release()

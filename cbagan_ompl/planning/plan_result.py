@@ -64,7 +64,8 @@ class PlanResult:
         nodes_at_first_solution: the same when the first solution was found; None when not solved or
             the planner does not let it be known.
         sample_counts: ``{"learned": n, "uniform": m}`` samples that the planner had from the heat
-            map's hook; both 0 for the uniform sampler, which has no hook.
+            map, whatever made it (``sampler`` says what), and from free space beside it; both 0 for
+            the uniform sampler, which has no hook.
         heatmap_kept: whether the heat map is that of an earlier plan of a
             :class:`cbagan_ompl.Replanner`.
         heatmap: what was sampled; None for the uniform sampler. Not part of the JSON.

@@ -26,7 +26,8 @@ def with_headings(setup: Any, heatmap: Heatmap, spread: HeadingSpread) -> Heatma
         spread: of the headings that are sampled.
     """
     space = setup.getStateSpace()
-    if heatmap.heading is not None or pose_space(space) is None or spread.uniform_fraction == 1:
+    # Headings are computed when they are asked for: first all that makes them unnecessary.
+    if pose_space(space) is None or spread.uniform_fraction == 1 or heatmap.heading is not None:
         return heatmap
     states, goal = state_access(space), setup.getGoal()
     state = compat.new_state(space)

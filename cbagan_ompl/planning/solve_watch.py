@@ -14,12 +14,12 @@ class SolveWatch:
 
     Args:
         target: a setup or a planner.
-        check: called before each solve.
+        check: called at the beginning of each solve.
         after: called after each solve that has returned.
     """
 
     def __init__(self, target: Any, check: Callable[[], None], after: Callable[[], None]) -> None:
-        self._calls: list[None] = []
+        self._calls: set[object] = set()
         self._count = 0
         self._target: Any = target
         self._watched: Any = self._watch_calls(target.solve, check, after)
@@ -55,13 +55,14 @@ class SolveWatch:
     ) -> Callable[..., Any]:
         @wraps(function)
         def watched(*arguments: Any, **options: Any) -> Any:
-            check()
-            self._count += 1
-            self._calls.append(None)
+            call = object()
             try:
+                self._calls.add(call)
+                check()
+                self._count += 1
                 result = function(*arguments, **options)
             finally:
-                self._calls.pop()
+                self._calls.discard(call)
             after()
             return result
 

@@ -10,6 +10,7 @@ from math import cos, inf, pi, sin
 from typing import Any
 
 from ..common.compilation import compiled
+from .arcs import follow_arc
 from .clearance_tables import BLOCKED, CLEAR, STEP, UNKNOWN
 
 TURN = 2 * pi
@@ -20,6 +21,8 @@ _TABLES = "uint8[:, ::1], int64[::1]," + _SHAPE
 
 # Most parts of a motion that are left to the exact test one by one; beyond that all of it is.
 _MOST_GAPS = 32
+
+_follow_arc = compiled(follow_arc)
 
 
 @compiled
@@ -88,13 +91,7 @@ def _pose_at(motion: Any, arcs: Any, t: float) -> tuple[float, float, float]:
         length, curvature = arcs[2 + 2 * arc], arcs[3 + 2 * arc]
         step = min(left, abs(length))
         left -= step
-        chord = step if length > 0 else -step
-        half = chord * curvature / 2
-        if half != 0.0:
-            chord *= sin(half) / half
-        u += chord * cos(heading + half)
-        v += chord * sin(heading + half)
-        heading += 2 * half
+        u, v, heading = _follow_arc(u, v, heading, step if length > 0 else -step, curvature)
     return u, v, heading % TURN
 
 

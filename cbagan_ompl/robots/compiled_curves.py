@@ -14,6 +14,7 @@ from math import acos, asin, atan2, cos, pi, sin
 from typing import Any
 
 from ..common.compilation import compiled
+from .arcs import follow_arc
 
 TURN = 2 * pi
 
@@ -21,6 +22,8 @@ TURN = 2 * pi
 _TOLERANCE = 1e-6
 # How far below zero a length may be by rounding, in turning radii.
 _ROUNDING = 1e-14
+
+_follow_arc = compiled(follow_arc)
 
 
 @compiled
@@ -78,11 +81,9 @@ def _keep(arcs: Any, lengths: Any, curvatures: Any) -> None:
     for arc in range(len(lengths)):
         step = min(left, abs(lengths[arc]))
         left -= step
-        half = (step if lengths[arc] > 0 else -step) * curvatures[arc] / 2
-        chord = step * sin(half) / half if half != 0.0 else step
-        chord = chord if lengths[arc] > 0 else -chord
-        x, y = x + chord * cos(heading + half), y + chord * sin(heading + half)
-        heading += 2 * half
+        x, y, heading = _follow_arc(
+            x, y, heading, step if lengths[arc] > 0 else -step, curvatures[arc]
+        )
     error = abs(x - arcs[12]) + abs(y - arcs[13]) + abs(_wrap(heading - arcs[14]))
     if not error < _TOLERANCE:
         return

@@ -112,8 +112,14 @@ def _footprints(content: Any) -> Iterator[Any]:
 
 
 def _as_numbers(file: Path, points: list[Any]) -> Any:
-    # PyYAML takes 5e-2 for a text (YAML 1.1 wants 5.0e-2), ROS for a number.
     try:
-        return np.array([[float(number) for number in point] for point in points])
+        return np.array([[_as_number(value) for value in point] for point in points])
     except (TypeError, ValueError, OverflowError) as error:
         raise RobotError(f"{file}: a footprint is a list of points, got {show(points)}") from error
+
+
+def _as_number(value: Any) -> float:
+    # PyYAML takes 5e-2 for a text (YAML 1.1 wants 5.0e-2), ROS for a number.
+    if isinstance(value, bool):
+        raise TypeError
+    return float(value)

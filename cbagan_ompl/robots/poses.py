@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..common.validation import is_finite_number
 from ..errors import MapError, TaskError, show
-from ..maps.endpoints import Moves, check_position
+from ..maps.endpoints import Moves, check_position, name_blocked
 from ..maps.grid_map import GridMap
 from .robot import Robot, check_robot
 from .shape_checker import ShapeChecker
@@ -145,7 +145,10 @@ def check_poses(checker: ShapeChecker, start: ArrayLike, goal: ArrayLike) -> Pos
     for role, pose in zip(("start", "goal"), poses, strict=True):
         check_position(grid, role, pose[:2])
         if not checker.pose_is_free(*pose.tolist()):
-            raise TaskError(describe_collision(grid, robot, role, pose))
+            raise TaskError(
+                describe_collision(grid, robot, role, pose)
+                + ", or let it be moved to the nearest one with snap (--snap D)"
+            )
     if np.array_equal(*poses):
         raise TaskError(f"start and goal are the same pose {_format(poses[0])}")
     positions = position_map(grid, robot)
@@ -246,8 +249,9 @@ def describe_collision(grid: GridMap, robot: Robot, role: str, pose: NDArray[np.
     length = robot.circumscribed_radius
     along = "front" if x > 0.2 * length else "rear" if x < -0.2 * length else "middle"
     column, row = np.floor(deepest).astype(int).tolist()
+    kind = name_blocked(grid, row, column)
     return (
-        f"{place}the robot's {along} touches an obstacle, at ({x:.3g}, {y:.3g}) in its own "
+        f"{place}the robot's {along} touches {kind}, at ({x:.3g}, {y:.3g}) in its own "
         f"frame (pixel column {column}, row {row}); choose another pose"
     )
 

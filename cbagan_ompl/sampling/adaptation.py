@@ -20,7 +20,7 @@ stays probabilistically complete.
 from __future__ import annotations
 
 from .budget import LearnedBudget
-from .heatmap import Heatmap
+from .heatmap import REGION_THRESHOLD, Heatmap
 from .monitor import Monitor
 from .options import Adaptation
 from .tree_coverage import TreeCoverage
@@ -54,7 +54,8 @@ class AdaptiveMixture:
         monitor: Monitor,
         budget: LearnedBudget | None = None,
     ) -> None:
-        self._region = heatmap.region.tobytes()
+        # Single values are read from a view faster than from an array.
+        self._values = heatmap.values.ravel().data
         self._adaptation = adaptation
         self._monitor = monitor
         self._budget = budget
@@ -97,7 +98,7 @@ class AdaptiveMixture:
         if self._is_in_goal and not in_goal:
             self.restart()  # a planner that ends with its first path has begun anew
         pixel = self._tree.add(x, y, covers)
-        if pixel is not None and self._region[pixel]:
+        if pixel is not None and self._values[pixel] >= REGION_THRESHOLD:
             self._samples_in_vain = 0
             self._set_fraction(self._most)
             if self._budget is not None:

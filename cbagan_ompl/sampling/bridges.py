@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..maps.connectivity import in_one_component
 from ..maps.grid_search import shortest_path
 from .bands import half_width, paint_window
 from .pixels import pixel_pair
@@ -49,10 +48,10 @@ def connect(heatmap: Heatmap, endpoints: NDArray[np.float64]) -> Heatmap:
         heatmap: any heat map.
         endpoints: start and goal, connected by free pixels, (2, 2), pixels.
     """
-    region, grid, pixels = heatmap.region, heatmap.grid, pixel_pair(endpoints)
-    if in_one_component(region, *pixels, connectivity=4):
+    grid, pixels = heatmap.grid, pixel_pair(endpoints)
+    if heatmap._connects_pixels(pixels):
         return heatmap
-    costs = _RegionCosts(heatmap.values, region)
+    costs = _RegionCosts(heatmap.values, heatmap.region)
     path = shortest_path(grid.free, *pixels, costs, _REPAIR_SIZE)
     assert path is not None, "the endpoints are connected"
     width = half_width(grid, _BRIDGE_FRACTION)

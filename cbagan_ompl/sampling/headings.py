@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from math import floor, inf, isnan, nan, pi
 from typing import TYPE_CHECKING, Any
 
@@ -159,8 +160,7 @@ class HeadingSampler:
         reverses: bool = False,
     ) -> None:
         grid = heatmap.grid
-        known = None if options.uniform_fraction == 1 else heatmap.heading
-        self._headings = None if known is None else known.reshape(-1).data
+        self._heatmap = heatmap
         self._affine = tuple(grid.pixel_from_world)
         self._width, self._height = grid.width, grid.height
         self._options, self._rng, self._reverses = options, rng, reverses
@@ -190,6 +190,12 @@ class HeadingSampler:
         # NaN fails the comparison.
         deviation = abs((yaw - self._known(x, y) + pi) % (2 * pi) - pi)
         return not (FOLLOWING < deviation < (pi - FOLLOWING if self._reverses else inf))
+
+    @cached_property
+    def _headings(self) -> memoryview | None:
+        """The headings of the pixels in a row: computed where poses are sampled, not for points."""
+        known = None if self._options.uniform_fraction == 1 else self._heatmap.heading
+        return None if known is None else known.reshape(-1).data
 
     def _refill(self) -> None:
         # What is sampled around 0 may be added to any heading.

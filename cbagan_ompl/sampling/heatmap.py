@@ -24,7 +24,7 @@ from .headings import check_headings, descend, look_up, sample_headings
 from .heatmap_files import read_heatmap_values
 from .heatmap_values import to_unit_range
 from .options import HeadingSpread
-from .pixels import WeightedPixels, pixel_pair, sample_in_pixels
+from .pixels import PixelPair, WeightedPixels, pixel_pair, sample_in_pixels
 from .robot_heatmaps import robot_heatmap
 
 #: A pixel whose value is at least this belongs to the promising region.
@@ -68,7 +68,7 @@ class Heatmap:
         (3, 2)
     """
 
-    _last_connected: tuple[object, bool] = None, False  # a pair of pixels, and the answer
+    _last_connected: tuple[PixelPair | None, bool] = None, False  # a pair of pixels, and the answer
 
     def __init__(self, values: ArrayLike, grid: GridMap, heading: ArrayLike | None = None) -> None:
         check_grid(grid, HeatmapError)
@@ -216,7 +216,10 @@ class Heatmap:
         endpoints = np.array((check_point("start", start), check_point("goal", goal)))
         if not self.grid.is_free(endpoints).all():
             return False
-        pixels = pixel_pair(self.grid.to_pixel(endpoints))
+        return self._connects_pixels(pixel_pair(self.grid.to_pixel(endpoints)))
+
+    def _connects_pixels(self, pixels: PixelPair) -> bool:
+        """Return whether the region connects two pixels; the last answer is kept."""
         if self._last_connected[0] != pixels:
             self._last_connected = pixels, in_one_component(self.region, *pixels, connectivity=4)
         return self._last_connected[1]

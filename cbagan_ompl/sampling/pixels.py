@@ -11,6 +11,10 @@ from ..maps.grid_map import GridMap
 _BLOCK, _LOOKED_UP = 16, 4096
 
 
+#: Two pixels (column, row).
+PixelPair = tuple[tuple[int, int], tuple[int, int]]
+
+
 class WeightedPixels:
     """Pixels that are sampled by their weights, exactly: by the inverse of the cumulative sum.
 
@@ -80,7 +84,7 @@ def sample_in_pixels(
     return grid.to_world(corners + rng.random((len(pixels), 2)))
 
 
-def pixel_pair(endpoints: NDArray[np.float64]) -> tuple[tuple[int, int], tuple[int, int]]:
+def pixel_pair(endpoints: NDArray[np.float64]) -> PixelPair:
     """Return the pixels (column, row) of two points (u, v), shape (2, 2)."""
     (u0, v0), (u1, v1) = np.floor(endpoints).astype(int).tolist()
     return (u0, v0), (u1, v1)

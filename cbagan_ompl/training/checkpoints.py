@@ -85,7 +85,7 @@ def load_checkpoint(path: str | PathLike[str]) -> dict[str, Any]:
     if schema > SCHEMA:
         raise ModelError(
             f"{source}: written by a newer version of cbagan-ompl; install that version "
-            "(pip install -U cbagan-ompl)"
+            "(git pull in the clone)"
         )
     _check_form(state, source)
     with translate_damage(source, "damaged, its configuration is none"):

@@ -285,6 +285,15 @@ def test_only_figures_of_our_own_are_replaced(
     assert main([*QUICK, "--output", str(path)]) == 0, "ours"
 
 
+def test_each_output_is_a_file_of_its_own(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "plan"
+    assert main([*QUICK, "--json", str(path), "--csv", str(path)]) == 2
+    assert "twice: give each output a name of its own" in capsys.readouterr().err
+    assert not path.exists()
+
+
 def test_no_input_is_replaced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "map.png"
     cv2.imwrite(str(path), np.full((40, 40), 255, np.uint8))

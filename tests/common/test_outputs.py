@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from cbagan_ompl import ConfigError, __version__
 from cbagan_ompl.common.figures import write_figure
-from cbagan_ompl.common.outputs import MADE_BY, check_output, write_report
+from cbagan_ompl.common.outputs import MADE_BY, check_distinct, check_output, write_report
 
 NOT_OURS = {
     "notes.md": b"# Notes on cbagan-ompl\n\ncbagan-ompl 0.2.0 plans paths.\n",
@@ -31,6 +31,13 @@ def test_what_does_not_exist_may_be_written(tmp_path: Path) -> None:
     check_output(str(tmp_path / "link"), [str(tmp_path)])
     with pytest.raises(ConfigError, match="its folder does not exist"):
         check_output(str(tmp_path / "none" / "a.json"))
+
+
+def test_two_outputs_of_one_file(tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to(tmp_path / "a.csv")
+    check_distinct(None, str(tmp_path / "a.csv"), None, str(tmp_path / "a.png"))
+    with pytest.raises(ConfigError, match=r"cannot write .*link twice"):
+        check_distinct(str(tmp_path / "a.csv"), None, str(tmp_path / "link"))
 
 
 @pytest.mark.parametrize("name", NOT_OURS)

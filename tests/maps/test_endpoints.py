@@ -29,6 +29,8 @@ def test_messages_tell_wall_margin_and_unknown_apart(grid: GridMap) -> None:
         (grid, (1, 1), "in unknown space of hall"),
         (grid.inflated(2), (12.5, 5), "too close to an obstacle of hall for the robot's radius"),
         (grid.inflated(2), (14.5, 5), "in an obstacle of hall"),
+        (grid.inflated(2), (1, 1), "in unknown space of hall"),
+        (grid.inflated(2), (1, 4.5), "too close to unknown space of hall for the robot's radius"),
     ):
         with pytest.raises(TaskError, match=rf"start \(.*\) is {message}"):
             space.check_task(point, goal)

@@ -81,6 +81,9 @@ def test_bilevel_png(tmp_path):
         (b"P5\n# c\n3 1\n100\n" + bytes([49, 50, 100]), [[0, 1, 1]]),
         (b"P5 2 1 1000\n" + struct.pack(">2H", 499, 500), [[0, 1]]),
         (b"P5 2 1 255\n\n\xff", [[0, 1]]),  # a pixel that looks like a line end
+        (b"P5\r\n2 1\r\n255\r\n\xff\0", [[1, 0]]),  # lines of Windows
+        (b"P6\r\n1 1\r\n255\r\n\xff\xff\0", [[1]]),
+        (b"P5 2 1 255\r\n\xff", [[0, 1]]),  # no byte too many
         (b"P5\r2\t1\r255\r\x80\x7f and more that is not looked at", [[1, 0]]),
     ],
 )

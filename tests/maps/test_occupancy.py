@@ -41,6 +41,7 @@ def test_costmap_blocks_from_the_inscribed_radius_on() -> None:
         ({"data": [0]}, MapError, "2 x 1 cells has 2 values, this one has 1"),
         ({"data": [0.5, 0.0]}, MapError, "whole numbers, got an array of float64"),
         ({"data": [True, False]}, MapError, "whole numbers, got an array of bool"),
+        ({"data": [[0], [100]]}, MapError, r"shape \(1, 2\), these have shape \(2, 1\)"),
         ({"data": []}, MapError, "whole numbers"),
         ({"data": [[0], [0, 1]]}, MapError, "no array"),
         ({"width": 0}, ConfigError, "width is a whole number of at least 1, got 0"),
@@ -75,6 +76,27 @@ def test_bad_costmaps(
 ) -> None:
     with pytest.raises(error, match=message):
         GridMap.from_costmap(costs, 0.1, ORIGIN, lethal)
+
+
+@pytest.mark.parametrize("percent", range(101))
+def test_a_cell_of_the_threshold_is_free(percent: int) -> None:
+    data = range(101)
+    grid = GridMap.from_occupancy_grid(data, 101, 1, 0.1, ORIGIN, free_thresh=percent / 100)
+    assert grid.free.sum() == percent + 1
+
+
+def test_what_is_masked_is_unknown_or_refused() -> None:
+    """Readers of ROS messages in NumPy mask what is unknown."""
+    data = np.ma.masked_equal(np.array([[0, -1, 100]], np.int8), -1)
+    grid = GridMap.from_occupancy_grid(data, 3, 1, 0.1, ORIGIN)
+    assert grid.free.tolist() == [[True, False, False]]
+    assert grid.unknown is not None
+    assert grid.unknown.tolist() == [[False, True, False]]
+    costs = np.ma.masked_array(np.zeros((1, 2), np.uint8), [[False, True]])
+    assert GridMap.from_costmap(costs, 0.1, ORIGIN).free.tolist() == [[True, False]]
+    with pytest.raises(MapError, match=r"masked cells .*\.filled\(False\)"):
+        GridMap(data < 50)
+    assert GridMap((data < 50).filled(False)).free.tolist() == [[True, False, False]]
 
 
 @pytest.mark.parametrize(

@@ -77,11 +77,44 @@ def test_no_pixel_that_a_polygon_touches_is_free(tmp_path: Path) -> None:
         ('<path d="m 0,0 1e999,0 0,4 z"/>', "no lengths"),
         ('<path d="M 0,0 9,0 9,9 8,9 8,1 0,1 z"/>', "not convex"),
         ("<path", "no valid XML"),
+        # Patterns that fit a text in many ways would take hours for these.
+        (f'<path d="m 0,0{" " * 3_000_000}!"/>', "no path data"),
+        (f'<path d="m 0,0{" ," * 1_000_000}!"/>', "no path data"),
+        (f'<path d="m 0,0 {"1" * 3_000_000}!"/>', "no path data"),
+        (f'<g transform="translate({"1" * 3_000_000}x"/>', "translate"),
+        (f'<g transform="translate(1{" " * 3_000_000}x"/>', "translate"),
     ],
 )
 def test_files_that_are_no_maps(tmp_path: Path, body: str, message: str) -> None:
     with pytest.raises(MapError, match=message):
         GridMap.load(write(tmp_path, body))
+
+
+@pytest.mark.parametrize("encoding", ["utf-7", "shift_jis", "no-such-thing", "rot13"])
+def test_odd_encodings_are_refused(tmp_path: Path, encoding: str) -> None:
+    path = tmp_path / "lot.svg"
+    path.write_text(f'<?xml version="1.0" encoding="{encoding}"?>{HEAD}{SQUARE}</svg>')
+    with pytest.raises(MapError, match="no valid XML"):
+        GridMap.load(path)
+
+
+def test_small_and_large_polygons_are_told_from_lines(tmp_path: Path) -> None:
+    for size in (1e-150, 1e-30, 1e8):
+        body = f'<path d="m 0,0 {size},0 0,{size} z"/>'
+        grid = GridMap.load(write(tmp_path, body), resolution=size / 4, margin=size)
+        assert np.count_nonzero(~grid.free) > 9
+        with pytest.raises(MapError, match="no area"):
+            GridMap.load(write(tmp_path, f'<path d="m 0,0 {size},{size} {size},{size} z"/>'))
+
+
+def test_overlapping_polygons_and_their_number(tmp_path: Path) -> None:
+    tall = '<path d="m 0,0 1,60 1,-60 z"/>'
+    path = write(tmp_path, 300 * tall)
+    grid = GridMap.load(path, resolution=0.5, margin=1.0)
+    one = GridMap.load(write(tmp_path, tall), resolution=0.5, margin=1.0)
+    assert np.array_equal(grid.free, one.free)
+    with pytest.raises(MapError, match="rows of pixels"):
+        GridMap.load(write(tmp_path, 2000 * tall), resolution=0.01, margin=1.0)
 
 
 def test_entities_are_refused(tmp_path: Path) -> None:

@@ -223,5 +223,6 @@ def test_scenarios_of_other_proportions_belong_to_another_map(tmp_path):
     path.write_text("version 1\n0\tarena.map\t30\t20\t1\t1\t25\t15\t30\n")
     assert len(load_tasks(path, GridMap(np.ones((40, 60), bool)))) == 1
     assert len(load_tasks(path, GridMap(np.ones((41, 60), bool)))) == 1, "rounded when scaled"
-    with pytest.raises(MapError, match="sizes in other proportions"):
-        load_tasks(path, GridMap(np.ones((30, 20), bool)))
+    for shape in ((30, 20), (21, 30), (20, 29)):  # of which the last two would not be scaled
+        with pytest.raises(MapError, match="sizes in other proportions"):
+            load_tasks(path, GridMap(np.ones(shape, bool)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,7 @@ from helpers.setups import (
 from cbagan_ompl import GridMap, Heatmap, PlannerError, TaskError, attach, reached_planners
 from cbagan_ompl.planning import compat
 from cbagan_ompl.planning.compat import ob, og, ou
-from cbagan_ompl.planning.monitor import is_monitored
+from cbagan_ompl.planning.monitor import is_monitored, release_forgotten
 
 GRID = small_walls()
 HEATMAP = small_heatmap(GRID)
@@ -81,14 +80,14 @@ def test_a_planner_without_a_setup(name: str) -> None:
 def test_a_planner_without_a_setup_is_let_go_when_it_is_forgotten(name: str) -> None:
     planner = bare_planner(name)
     attachment = attach(planner, HEATMAP)
-    gc.collect()
+    release_forgotten()
     assert is_monitored(planner), "both are still there"
     monitor = attachment._monitor
     del attachment
-    gc.collect()
+    release_forgotten()
     assert monitor.refers_to(planner), "the planner is still there, and samples the heat map"
     del planner
-    gc.collect()
+    attach(bare_planner(name), HEATMAP).detach()
     assert monitor.refers_to(None)
 
 

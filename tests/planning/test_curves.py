@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from cbagan_ompl import GridMap, Robot
 from cbagan_ompl.planning import compat
 from cbagan_ompl.planning.compat import ob
-from cbagan_ompl.planning.goal_approach import follow_arc
 from cbagan_ompl.planning.states import state_access
+from cbagan_ompl.robots.arcs import follow_arc
 from cbagan_ompl.robots.compiled_curves import find_curve
 from cbagan_ompl.robots.shape_checker import ShapeChecker
 

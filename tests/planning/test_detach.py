@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import os
 import resource
 import subprocess
@@ -25,6 +24,7 @@ from helpers.setups import (
 from cbagan_ompl import PlannerError, attach, plan, reached_planners
 from cbagan_ompl.planning import compat
 from cbagan_ompl.planning.compat import ob, ou
+from cbagan_ompl.planning.monitor import release_forgotten
 
 GRID = small_walls()
 HEATMAP = small_heatmap(GRID)
@@ -127,18 +127,23 @@ print("done")
 
 def test_detach_early_in_the_planners_own_solve_does_not_crash() -> None:
     """Before it has asked for a sample, too, where it is not known that it plans."""
+    done = run_script(EARLY)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "done\n"
+
+
+def run_script(code: str) -> subprocess.CompletedProcess[str]:
+    """Run code that imports this file in another process."""
     here = Path(__file__)
     paths = [str(here.parent), str(here.parents[1]), *sys.path]
-    done = subprocess.run(
-        [sys.executable, "-c", EARLY],
+    return subprocess.run(
+        [sys.executable, "-c", code],
         env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
         capture_output=True,
         text=True,
         timeout=120,
         check=False,
     )
-    assert done.returncode == 0, done.stderr
-    assert done.stdout == "done\n"
 
 
 def test_the_error_leaves_the_solve() -> None:
@@ -180,13 +185,70 @@ def test_forgotten_attachments_cost_nothing() -> None:
     for planner in ("RRT", "RRTstar", "PRM"):
         for seed in range(30):
             forget(planner, seed)
-        gc.collect()
         before = resident()
         for seed in range(200):
             forget(planner, seed)
-        gc.collect()
         # Each would cost about 200 KB.
         assert resident() - before < 200 * 20_000, planner
+
+
+def test_forgotten_attachments_are_let_go_when_another_planner_solves() -> None:
+    setup = small_setup(GRID, "RRTstar")
+    with attach(setup, HEATMAP, seed=1):
+        many = [attach(small_setup(GRID, "RRT"), HEATMAP) for _ in range(3)]
+        monitors = [attachment._monitor for attachment in many]
+        del many
+        assert not any(monitor.is_released for monitor in monitors)
+        solve_for(setup, 1)
+        assert all(monitor.is_released for monitor in monitors)
+
+
+def test_a_setup_that_only_its_solve_refers_to_is_not_forgotten() -> None:
+    samplers: list[Any] = []
+
+    def attached_setup() -> Any:
+        setup = small_setup(GRID, "RRTstar")
+        attachment = attach(setup, HEATMAP, seed=1)
+        samplers.append(attachment._sampler)
+        return setup
+
+    solve_for(attached_setup(), 50)
+    steps = iter(range(50))
+
+    def attach_another() -> bool:
+        attach(small_setup(GRID, "RRT"), HEATMAP).detach()
+        return next(steps, None) is None
+
+    attached_setup().solve(compat.termination_condition(attach_another))
+    assert all(sampler.sample_counts["learned"] > 20 for sampler in samplers)
+
+
+LOSING = """
+import gc, signal, time
+from test_detach import GRID, HEATMAP, attach, small_setup
+many = [[] for _ in range(10**6)]
+setup = small_setup(GRID, "RRT")
+attachment = attach(setup, HEATMAP)
+signal.signal(signal.SIGALRM, signal.default_int_handler)
+for _ in range(5):
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.005)
+        gc.collect()
+        time.sleep(60)
+        print("lost")
+    except KeyboardInterrupt:
+        print("seen")
+"""
+
+
+def test_no_interrupt_is_lost_while_garbage_is_collected() -> None:
+    """One that arrives meanwhile is raised in what Python runs next, which must not be a callback.
+
+    In another process, because libraries for tests have callbacks of their own.
+    """
+    done = run_script(LOSING)
+    assert done.stdout == 5 * "seen\n", done.stderr
+    assert done.stderr == ""
 
 
 def test_what_is_still_in_use_is_not_forgotten() -> None:
@@ -194,7 +256,6 @@ def test_what_is_still_in_use_is_not_forgotten() -> None:
     attach(setup, HEATMAP, seed=1)  # the attachment alone is forgotten
     planner = setup.getPlanner()
     goal = setup.getGoal()
-    gc.collect()
     attach(small_setup(GRID, "RRT"), HEATMAP).detach()
     solve_for(setup, 50)
     assert type(setup.getGoal()).__name__ == "InjectedGoal"
@@ -202,7 +263,7 @@ def test_what_is_still_in_use_is_not_forgotten() -> None:
     assert sum(counts.values()) > 30
     problem = setup.getProblemDefinition()
     del setup
-    gc.collect()
+    release_forgotten()
     planner.clear()
     problem.clearSolutionPaths()
     solve_for(planner, 50)

@@ -11,13 +11,9 @@ import pytest
 from cbagan_ompl import GridMap, HeadingSpread, Heatmap, attach
 from cbagan_ompl.planning import compat
 from cbagan_ompl.planning.compat import ob, og, ou
-from cbagan_ompl.planning.goal_approach import (
-    GoalApproach,
-    follow_arc,
-    goal_approach,
-    turning_radius,
-)
+from cbagan_ompl.planning.goal_approach import GoalApproach, goal_approach, turning_radius
 from cbagan_ompl.planning.sample_budget import budget_of
+from cbagan_ompl.robots.arcs import follow_arc
 from cbagan_ompl.sampling.budget import ADVANCE, EARNED_BY_UNIFORM_POSE
 from cbagan_ompl.sampling.sampler import HeatmapSampler
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import _thread
-import gc
 import sys
 import threading
 import time
@@ -224,7 +223,7 @@ def test_planners_without_a_path_are_given_back_while_they_wait() -> None:
     attachment = attach(small_setup(GRID, "RRT"), future)
     monitor = attachment._monitor
     del attachment
-    gc.collect()
+    attach(small_setup(GRID, "RRT"), HEATMAP).detach()
     assert monitor.refers_to(None)
     future.set_result(HEATMAP)
 

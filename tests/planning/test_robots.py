@@ -152,6 +152,16 @@ BAD: list[tuple[dict[str, Any], type[CbaganOmplError], str]] = [
 ]
 
 
+def test_a_pose_in_unknown_space_is_told_from_one_in_an_obstacle() -> None:
+    free = np.ones((60, 60), bool)
+    free[30:, 30:] = False
+    robot = Robot.rectangle(8, 4)
+    for unknown, message in ((~free, "touches unknown space"), (None, "touches an obstacle")):
+        grid = GridMap(free, unknown=unknown)
+        with pytest.raises(TaskError, match=rf"{message}, .* the nearest one with snap"):
+            plan(grid, (40, 40, 0), (10, 10, 0), sampler="uniform", robot=robot)
+
+
 @pytest.mark.parametrize(("changes", "kind", "message"), BAD)
 def test_bad_input(
     open_space: GridMap, changes: dict[str, Any], kind: type[CbaganOmplError], message: str

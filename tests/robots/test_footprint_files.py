@@ -53,6 +53,7 @@ def test_lists_of_points(tmp_path: Path, text: str) -> None:
         ("footprint: [[0, 0], [1, 0], [.nan, 1]]", "finite"),
         ("footprint: [[0, 0], [1], [0, 1]]", "list of points"),
         ("footprint: [[0, 0], [1, a], [0, 1]]", "list of points"),
+        ("footprint: [[false, false], [true, false], [true, true]]", "list of points"),
         ('footprint: "[[0, 0], [1, 0]"', "no valid YAML"),
         ("a: {footprint: [[0, 0], [1, 0], [0, 1]]}\nb: {footprint: []}", "differ"),
         ("&a [*a]", "aliases"),

@@ -8,6 +8,7 @@ import pytest
 
 from cbagan_ompl import GridMap, Heatmap
 from cbagan_ompl.sampling.painting import paint_heatmap
+from cbagan_ompl.sampling.sampler import HeatmapSampler
 
 SHAPES = [(40, 33), (80, 66), (160, 132), (97, 71), (41, 66), (20, 16), (20, 70)]
 
@@ -65,3 +66,17 @@ def test_headings_are_those_of_the_patches_where_there_is_a_value() -> None:
     assert turned.heading[15, 15] == pytest.approx(0.3 - np.pi + 2 * np.pi * (0.3 < 0), abs=1e-5)
     assert pickle.loads(pickle.dumps(turned)).heading[0, 0] == turned.heading[0, 0]
     assert turned.with_heading(None).heading is None
+
+
+def test_headings_are_computed_for_poses_alone() -> None:
+    grid = GridMap(np.ones((8, 8), np.bool_))
+    directions = np.ones((2, 2, 2), np.float32)
+    heatmap = paint_heatmap(np.ones((8, 8), np.float32), grid, 0.25, directions, (2, 2))
+    assert heatmap is not None
+    sampler = HeatmapSampler(heatmap, seed=0)
+    headings = sampler.heading_sampler(reverses=False)
+    for _ in range(100):
+        x, y = sampler.next()
+    assert "heading" not in vars(heatmap)
+    assert headings.are_followed(x, y, np.pi / 4)
+    assert "heading" in vars(heatmap)

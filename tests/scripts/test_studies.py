@@ -58,6 +58,39 @@ def test_paper_tables(folder: Path, tmp_path: Path) -> None:
         assert samplers["uniform"]["nodes_ratio"] == [1, 1, 1]
         assert samplers["bundled"]["nodes"][0] > 1
         assert samplers["bundled"]["inference_ms"][0] > 0
+        assert samplers["bundled, not adapted"]["nodes"][0] > 1
+
+
+@pytest.mark.slow
+def test_paper_networks(folder: Path, tmp_path: Path) -> None:
+    pytest.importorskip("torch")
+    report = tmp_path / "networks.json"
+    words = [str(folder), "--output", str(tmp_path / "runs"), "--seeds", "2", "--epochs", "1"]
+    for _ in range(2):  # the second time all runs are complete
+        run_script(
+            STUDIES / "paper_networks.py", *words, "--tasks", "2", "--timing", "--json", str(report)
+        )
+    result = json.loads(report.read_text())
+    assert result["epochs"] == 1
+    networks = result["networks"]
+    assert networks.keys() == {"cbagan", "sa", "ca", "none", "sagan", "segmentation"}
+    for row in networks.values():
+        assert row["epoch_s"] > 0
+        assert [run["epoch"] for run in row["seeds"]] == [1, 1]
+        assert row["iou"][1] <= row["seeds"][0]["scores"]["iou"] <= row["iou"][2]
+    # The discriminators are no part of what is exported.
+    assert networks["segmentation"]["parameters"] == networks["cbagan"]["parameters"]
+
+
+def test_pixels_of_both_classes_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("torch")
+    monkeypatch.syspath_prepend(str(STUDIES))
+    right_pixels = runpy.run_path(str(STUDIES / "paper_networks.py"))["right_pixels"]
+    # Of 100 pixels 20 are in the region; 15 of them are found, and 5 others are taken for it.
+    scores = {"precision": 15 / 20, "recall": 15 / 20}
+    assert right_pixels(scores, 0.2) == pytest.approx(0.9)
+    # An empty prediction.
+    assert right_pixels({"precision": 0.0, "recall": 0.0}, 0.18) == pytest.approx(0.82)
 
 
 @pytest.mark.slow
