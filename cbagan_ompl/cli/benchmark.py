@@ -268,8 +268,8 @@ def _benchmark(args: argparse.Namespace) -> int:
     )
     if chosen.left_out:
         print("warning:", *describe_left_out(chosen.left_out), sep="\n", file=sys.stderr)
-    benchmark = Benchmark(chosen.tasks, settings, Path(args.output), args.resume)
     with open_executor(args) as executor:
+        benchmark = Benchmark(chosen.tasks, settings, Path(args.output), args.resume)
         failures = benchmark.run(executor)
     logs = benchmark.finished_logs(failures)
     if logs:

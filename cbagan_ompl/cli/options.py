@@ -48,7 +48,7 @@ def add_scheduler_option(parser: Any) -> None:
         metavar="ADDRESS",
         help="use the workers of a Dask cluster that you trust, and no processes of this machine: "
         "address of its scheduler, tcp://HOST:PORT, or its --scheduler-file; needs "
-        "cbagan-ompl[cluster]",
+        "the extra cluster",
     )
 
 

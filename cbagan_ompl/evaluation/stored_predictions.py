@@ -31,7 +31,7 @@ def load_predictions(folder: Path, dataset: Path, part: str) -> NDArray[np.bool_
 
     Raises:
         DatasetError: the folder or a prediction is missing; a prediction is no image, no square,
-            or of another size than the others; or the list of them cannot be read.
+            gray, or of another size than the others; or the list of them cannot be read.
     """
     if not folder.is_dir():
         raise DatasetError(
@@ -54,6 +54,11 @@ def load_predictions(folder: Path, dataset: Path, part: str) -> NDArray[np.bool_
             regions = np.empty((len(labels), height, width), np.bool_)
         # Red and blue are 255 in white and 0 in green; the threshold is half way between.
         regions[i] = image[..., ::2].mean(axis=-1) < 127.5
+        # In a gray image white may be the region, and would be read as what is outside of it.
+        if regions[i].any() and (image[..., :1] == image[..., 1:]).all():
+            raise DatasetError(
+                f"{files[name]} is a gray image; stored predictions are green on white"
+            )
     assert regions is not None, "the lists of a set are not empty"
     return regions
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 
@@ -252,9 +253,6 @@ class BenchmarkSession:
         self._variants = {variant.name: variant for variant in variants}
         self._sources = {e.sampler: e.source for e in variants if e.source is not None}
         self._heatmaps: dict[str, tuple[Heatmap, float]] = {}
-        # One generator for all runs, so that each has other samples.
-        rng = np.random.default_rng(options.seed)
-        self._sampler_options = replace(options.sampler, seed=rng)
         self._attachment: Attachment | None = None
         self._inference_s = 0.0
 
@@ -282,7 +280,11 @@ class BenchmarkSession:
         self._inference_s = 0.0
         if variant.sampler in self._heatmaps:
             heatmap, made_in = self._heatmaps[variant.sampler]
-            options = replace(self._sampler_options, **dict(variant.sampler_changes))
+            options = replace(
+                self._options.sampler,
+                seed=self._rng_of_run(variant),
+                **dict(variant.sampler_changes),
+            )
             self.setup.setPlanner(instance)
             began = perf_counter()
             self._attachment = attach(self.setup, heatmap, options)
@@ -293,6 +295,11 @@ class BenchmarkSession:
         else:
             search_to_the_end(self.setup)
         self._motions.begin_run(instance, variant.planner)
+
+    def _rng_of_run(self, variant: PlannerVariant) -> np.random.Generator:
+        """Return the generator of a run, which does not depend on how long others have run."""
+        number = len(self.records[variant.name])
+        return np.random.default_rng([self._options.seed, crc32(variant.name.encode()), number])
 
     def after_run(self, planner: Any, _: Any) -> None:
         """Record a run: Benchmark's post-run event.

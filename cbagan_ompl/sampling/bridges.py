@@ -78,6 +78,6 @@ def _raise(heatmap: Heatmap, window: tuple[slice, slice], least: NDArray[np.floa
     values.setflags(write=False)
     # All that Heatmap() would check is known. The headings are the same.
     raised = copy(heatmap)
-    raised.values, raised._support = values, support
+    raised.values, raised.support = values, support
     raised.guarantee, raised._last_connected = None, (None, False)
     return raised

@@ -47,6 +47,7 @@ class Heatmap:
         heading: float32, shape (H, W): the direction of travel in each pixel, world radians in
             [-pi, pi], NaN where unknown; or None where nothing is known.
         guarantee: what is known of the pixels from a threshold on; None where nothing is.
+        support: flat row-major indices of the pixels with a value above 0, ascending, shape (K,).
 
     Args:
         values: any real array of the grid's shape. Unsigned integers are scaled from their full
@@ -96,7 +97,7 @@ class Heatmap:
         self.grid = grid
         self.heading = None if heading is None else check_headings(heading, grid)
         self.guarantee: Guarantee | None = None
-        self._support = support
+        self.support: NDArray[np.intp] = support
 
     @classmethod
     def load(cls, path: str | PathLike[str], grid: GridMap) -> Heatmap:
@@ -304,7 +305,7 @@ class Heatmap:
         """
         count = whole_number("n", n, 0, _MOST_SAMPLES)
         generator = random_generator(rng)
-        weighted = WeightedPixels(self._support, self.values.ravel()[self._support])
+        weighted = WeightedPixels(self.support, self.values.ravel()[self.support])
         pixels = weighted.sample(count, generator)
         return sample_in_pixels(self.grid, pixels, generator)
 
@@ -341,11 +342,6 @@ class Heatmap:
             look_up(self.heading, self.grid, points), spread, generator, reverses
         )
         return np.column_stack((points, headings))
-
-    @property
-    def support(self) -> NDArray[np.intp]:
-        """Flat row-major indices of the pixels with a value above 0, ascending, shape (K,)."""
-        return self._support
 
     def __repr__(self) -> str:
         fraction = self.region.sum() / self.grid.free.sum()

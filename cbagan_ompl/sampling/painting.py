@@ -55,7 +55,7 @@ def paint_heatmap(
         painted.directions, painted.patches, painted.painted = directions, patches, support
     heatmap.values, heatmap.grid = result, grid
     heatmap.guarantee = None
-    heatmap._support = support
+    heatmap.support = support
     return heatmap
 
 

@@ -84,6 +84,16 @@ def test_benchmark_is_the_same_on_workers(cluster: Cluster, tmp_path: Path) -> N
     assert first.is_file()
 
 
+def test_a_cluster_that_cannot_be_used_leaves_no_folder(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = tmp_path / "results"
+    words = ["benchmark", "bundled:maze", "--samplers", "uniform", "--output", str(output)]
+    assert main([*words, "--scheduler", "nowhere://host"]) == 2
+    assert "no scheduler answers at 'nowhere://host'" in capsys.readouterr().err
+    assert not output.exists()
+
+
 def test_tasks_that_fail_are_reported_alone(
     cluster: Cluster, two_walls: GridMap, tmp_path: Path
 ) -> None:
@@ -175,3 +185,15 @@ def test_noise_is_the_same_on_workers(cluster: Cluster, tmp_path: Path) -> None:
     words += ["--scheduler", cluster.address, "--json", str(tmp_path / "remote.json")]
     assert main(words) == 0
     assert (tmp_path / "local.json").read_text() == (tmp_path / "remote.json").read_text()
+
+
+@pytest.mark.parametrize("label", ["rrt", "geodesic"])
+def test_labels_of_own_maps_are_the_same_on_workers(
+    cluster: Cluster, tmp_path: Path, label: str
+) -> None:
+    words = ["dataset", "label", "bundled:maze", "bundled:rooms", "--size", "64", "--tasks", "2"]
+    words += ["--label", label, "--runs", "3", "--seed", "1"]
+    local, remote = tmp_path / "local", tmp_path / "remote"
+    assert main([*words, "--output", str(local)]) == 0
+    assert main([*words, "--output", str(remote), "--scheduler", cluster.address]) == 0
+    assert_same_files(local, remote)

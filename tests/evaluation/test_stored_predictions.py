@@ -38,6 +38,18 @@ def test_faults_in_stored_predictions(folder: Path, dataset: Dataset, tmp_path: 
         load_predictions(tmp_path, folder, "test")
 
 
+def test_gray_predictions_are_not_guessed_at(
+    folder: Path, dataset: Dataset, tmp_path: Path
+) -> None:
+    regions = dataset.test.region.copy()
+    regions[0] = 0
+    store(tmp_path, folder, regions, listed=True)
+    assert not load_predictions(tmp_path, folder, "test")[0].any(), "white alone is no region"
+    cv2.imwrite(str(tmp_path / "roi_0.png"), dataset.test.region[0] * np.uint8(255))
+    with pytest.raises(DatasetError, match=r"roi_0\.png is a gray image; .* green on white"):
+        load_predictions(tmp_path, folder, "test")
+
+
 def test_damaged_lists_of_predictions_are_read_or_refused(
     folder: Path, dataset: Dataset, tmp_path: Path
 ) -> None:

@@ -2,11 +2,14 @@ from __future__ import annotations
 
 import os
 import signal
+from typing import Any
 
 import numpy as np
 import pytest
 
-from cbagan_ompl import GridMap, Heatmap, PlannerError, TaskError
+from cbagan_ompl import GridMap, Heatmap, PlannerError, SamplerOptions, TaskError, attach
+from cbagan_ompl.planning import ompl_benchmark
+from cbagan_ompl.planning.attach import Attachment
 from cbagan_ompl.planning.compat import BOOST_PYTHON
 from cbagan_ompl.planning.ompl_benchmark import (
     PlannerVariant,
@@ -29,6 +32,33 @@ def test_errors_in_events_come_out(two_walls: GridMap) -> None:
     with pytest.raises(TaskError, match="outside of the heat map's map"):
         run_benchmark("x", Workspace(two_walls), task, variants, options, lambda: rounds.append(1))
     assert len(rounds) == 1
+
+
+def test_samples_of_a_run_do_not_depend_on_how_long_others_have_run(
+    two_walls: GridMap, corridor: Heatmap, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As they would with limits of time, on machines of other speed."""
+    task = two_walls.check_task((10, 10), (240, 240))
+    variants = [PlannerVariant("RRT", name, lambda *_: corridor) for name in ("one", "two")]
+    begins: list[list[float]] = [[], []]
+    for begin, used in zip(begins, (0, 7), strict=True):
+
+        def attach_later(
+            setup: Any,
+            heatmap: Heatmap,
+            options: SamplerOptions,
+            begin: list[float] = begin,
+            used: int = used,
+        ) -> Attachment:
+            assert isinstance(options.seed, np.random.Generator)
+            begin.append(options.seed.random())
+            options.seed.random(used)
+            return attach(setup, heatmap, options)
+
+        monkeypatch.setattr(ompl_benchmark, "attach", attach_later)
+        run_benchmark("x", Workspace(two_walls), task, variants, RunOptions(2, 5.0, range=20.0))
+    assert len(set(begins[0])) == 4, "each has samples of its own"
+    assert begins[0] == begins[1]
 
 
 @pytest.mark.usefixtures("interruptible")
