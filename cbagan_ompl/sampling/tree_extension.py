@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from math import cos, floor, pi, sin
+from math import floor, pi
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..common.compilation import compiled
+from ..robots.arcs import follow_arc
 from .headings import FOLLOWING
 from .heatmap import Heatmap
 
@@ -17,6 +18,8 @@ _TRIES = 512
 _SHORTEST = 0.1
 # Nodes for which there is room at first.
 _FIRST_ROOM = 256
+
+_follow_arc = compiled(follow_arc)
 
 
 class TreeExtension:
@@ -130,11 +133,7 @@ def _find(
         length = range * (_SHORTEST + (1 - _SHORTEST) * rng.random())
         first = rng.random()
         for part in (first, 1 - first):
-            half = part * length * (2 * rng.random() - 1) / (2 * radius)
-            chord = part * length * (sin(half) / half if half else 1.0)
-            x += chord * cos(yaw + half)
-            y += chord * sin(yaw + half)
-            yaw += 2 * half
+            x, y, yaw = _follow_arc(x, y, yaw, part * length, (2 * rng.random() - 1) / radius)
         u = floor(affine[0] * x + affine[1] * y + affine[2])
         v = floor(affine[3] * x + affine[4] * y + affine[5])
         if not (0 <= u < width and 0 <= v < height) or covered[v, u]:
@@ -145,5 +144,5 @@ def _find(
         deviation = abs((yaw - offer + pi) % (2 * pi) - pi)
         # NaN fails the comparison.
         if not deviation > FOLLOWING:
-            return number, x, y, (yaw + pi) % (2 * pi) - pi
+            return number, x, y, yaw
     return -1, 0.0, 0.0, 0.0
