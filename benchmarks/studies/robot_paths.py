@@ -170,9 +170,14 @@ def runs(args: argparse.Namespace, tasks: list[tuple[bool, PoseTask, Robot]]) ->
 
 def warm_up(predictor: Predictor) -> None:
     """Load and compile what is loaded and compiled once."""
-    grid, robot = GridMap.load("bundled:rooms"), Robot.rectangle(LENGTH, WIDTH)
-    for source in (predictor.predict, Heatmap.corridor):
-        source(grid, (20, 20, 0), (230, 230, 0), robot=robot).directed((230, 230))
+    grid, ends = GridMap.load("bundled:rooms"), ((20, 20, 0), (230, 230, 0))
+    for options in SPACES.values():
+        robot = Robot.rectangle(LENGTH, WIDTH, **options)
+        setup = make_setup(PoseTask("rooms", grid, *ends, 0.0, 0.0), robot, "RRTstar")
+        for source in (predictor.predict, Heatmap.corridor):
+            heatmap = source(grid, *ends, robot=robot).directed((230, 230))
+            with attach(setup, heatmap, seed=0):
+                solve(setup, 0.1, first=True)
 
 
 def measure(run: Run, predictor: Predictor, limit: float) -> dict[str, Any]:

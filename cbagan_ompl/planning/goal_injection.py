@@ -10,6 +10,7 @@ from .awaited import AwaitedHeatmap
 from .compat import ob
 from .goal_approach import GoalApproach, goal_approach
 from .goal_monitor import GoalMonitor
+from .pose_extension import PoseExtension, pose_extension
 from .sample_budget import needs_many_poses
 from .states import StateAccess
 
@@ -58,6 +59,7 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
         self._awaited: AwaitedHeatmap | None = None
         self._sampler: HeatmapSampler
         self._approach: GoalApproach | None = None
+        self._extension: PoseExtension | None = None
         if isinstance(source, AwaitedHeatmap):
             self._awaited = source
             source.hand_to(self._follow)
@@ -74,7 +76,10 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
         if monitor.is_trusted:
             x, y = self._states.read(state)
             in_goal = distance < self._threshold
-            self._sampler.on_new_node(x, y, in_goal, self._states.follows_heatmap(state))
+            follows = self._states.follows_heatmap(state)
+            count = self._sampler.on_new_node(x, y, in_goal, follows)
+            if count and self._extension is not None:
+                self._extension.add(state, count)
             if in_goal:
                 monitor.note_reached()
         return distance
@@ -121,6 +126,8 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
     def _sample_heatmap(self, state: Any) -> None:
         """Sample the heat map; a pose in collision gets another heading, a few times."""
         x, y = self._sampler.next()
+        if self._is_extended(state):
+            return
         self._states.write(state, x, y)
         if self._si is not None:
             for _ in range(_MOST_REJECTED):
@@ -128,9 +135,17 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
                     return
                 self._states.write(state, x, y)
 
+    def _is_extended(self, state: Any) -> bool:
+        """Set a state to a pose that the tree reaches, before the first path, if there is one."""
+        extension = self._extension
+        if extension is None or self._monitor.has_solution or not self._sampler.is_learned:
+            return False
+        return extension.move(state)
+
     def _take(self, sampler: HeatmapSampler) -> None:
         self._sampler = sampler
         self._approach = goal_approach(self.getSpaceInformation().getStateSpace(), sampler)
+        self._extension = pose_extension(self._monitor.setup.getPlanner(), sampler)
 
     def _follow(self, sampler: HeatmapSampler, states: StateAccess) -> None:
         """Sample a heat map from now on."""

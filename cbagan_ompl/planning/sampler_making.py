@@ -17,12 +17,11 @@ from .attachable import check_frames
 from .hooks import BOUNDS_STEERING, GOAL_INJECTION, samples_are_nodes
 from .monitor import PlannerMonitor
 from .planner_kinds import plans_controls
+from .pose_extension import range_of
 from .pose_headings import with_headings
 from .sample_budget import budget_of, needs_many_poses
 from .states import StateAccess, drives_backwards, position_bounds, state_access
 
-# OMPL's range of a planner that was given none, as a fraction of the extent of the space.
-_OMPL_RANGE = 0.2
 # How far around a node its tree is taken to be, as a fraction of the range.
 _REACH = 0.8
 
@@ -104,7 +103,4 @@ def _reach_of(planner: Any) -> float:
     """
     if plans_controls(planner):
         return 0.0
-    # Before its setup a planner may have no range yet; OMPL then takes a fraction of the space.
-    si = planner.getSpaceInformation()
-    range = planner.getRange() if hasattr(planner, "getRange") else 0.0
-    return _REACH * float(range or _OMPL_RANGE * si.getMaximumExtent())
+    return _REACH * range_of(planner)

@@ -80,7 +80,7 @@ class AdaptiveMixture:
             self._watches = self._is_watching = False
             self.covered = None
 
-    def on_new_node(self, x: float, y: float, in_goal: bool, covers: bool = True) -> None:
+    def on_new_node(self, x: float, y: float, in_goal: bool, covers: bool = True) -> int:
         """Note that the tree has a new node.
 
         Args:
@@ -89,9 +89,12 @@ class AdaptiveMixture:
             in_goal: whether the node is in the goal region.
             covers: whether the tree is there by it; with another heading than that of the heat map
                 it may not get on from there.
+
+        Returns:
+            How many nodes the tree has as far as is known; 0 while it is not watched.
         """
         if not self._is_watching:
-            return
+            return 0
         if self._is_in_goal and not in_goal:
             self.restart()  # a planner that ends with its first path has begun anew
         pixel = self._tree.add(x, y, covers)
@@ -101,6 +104,7 @@ class AdaptiveMixture:
             if self._budget is not None:
                 self._budget.earn_by_node()
         self._is_in_goal = in_goal
+        return self._tree.node_count
 
     def on_sample(self) -> None:
         """Note that a learned sample is asked for before the first path."""

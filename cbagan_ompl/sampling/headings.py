@@ -24,8 +24,8 @@ _LEAST_VALUE = 0.02
 # Headings that are sampled at a time.
 _BATCH = 512
 
-# How far a heading may deviate from that of the heat map and still follow it, radians.
-_FOLLOWING = 0.6
+#: How far a heading may deviate from that of the heat map and still follow it, radians.
+FOLLOWING = 0.6
 
 
 def check_headings(heading: ArrayLike, grid: GridMap) -> NDArray[np.float32]:
@@ -189,7 +189,7 @@ class HeadingSampler:
         """
         # NaN fails the comparison.
         deviation = abs((yaw - self._known(x, y) + pi) % (2 * pi) - pi)
-        return not (_FOLLOWING < deviation < (pi - _FOLLOWING if self._reverses else inf))
+        return not (FOLLOWING < deviation < (pi - FOLLOWING if self._reverses else inf))
 
     @cached_property
     def _headings(self) -> memoryview | None:

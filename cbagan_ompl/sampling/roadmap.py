@@ -33,7 +33,7 @@ class RoadmapMixture:
     def on_start(self, connected: bool) -> None:
         """Do nothing: whether the region is connected does not matter to a roadmap."""
 
-    def on_new_node(self, x: float, y: float, in_goal: bool, covers: bool = True) -> None:
+    def on_new_node(self, x: float, y: float, in_goal: bool, covers: bool = True) -> int:
         """Note a valid sample.
 
         Args:
@@ -41,8 +41,12 @@ class RoadmapMixture:
             y: of the sample, world.
             in_goal: whether it is in the goal, which does not matter here.
             covers: whether it does instead of another sample there.
+
+        Returns:
+            How many there are.
         """
         self._coverage.add(x, y, covers)
+        return self._coverage.node_count
 
     def on_sample(self) -> None:
         """Do nothing: valid samples count, see :meth:`on_new_node`."""

@@ -35,6 +35,7 @@ class HeatmapSampler:
         rng: the generator of the samples, and of whatever else belongs to the same run.
         chance: returns a random number of ``rng`` in [0, 1) at each call.
         monitor: of the planner that is fed.
+        is_learned: whether the last sample of :meth:`next` was learned.
         spread: how the headings of poses follow those of the heat map.
 
     Args:
@@ -78,6 +79,7 @@ class HeatmapSampler:
         self.monitor = monitor or NoMonitor()
         self._mixture = mixture
         self._budget = budget
+        self.is_learned = False
         self._learned_count = self._uniform_count = 0
         self._best = inf
         self._has_begun = False
@@ -92,6 +94,11 @@ class HeatmapSampler:
     def sample_counts(self) -> dict[str, int]:
         """Samples handed out so far: ``{"learned": n, "uniform": m}``."""
         return {"learned": self._learned_count, "uniform": self._uniform_count}
+
+    @property
+    def covered(self) -> bytearray | None:
+        """Row-major bytes of the pixels where no learned sample goes before the first path."""
+        return None if self._mixture is None else self._mixture.covered
 
     def heading_sampler(self, reverses: bool) -> HeadingSampler:
         """Return what samples the headings of poses, from the same generator.
@@ -137,7 +144,7 @@ class HeatmapSampler:
         if self._budget is not None:
             self._budget.restart()
 
-    def on_new_node(self, x: float, y: float, in_goal: bool, covers: bool = True) -> None:
+    def on_new_node(self, x: float, y: float, in_goal: bool, covers: bool = True) -> int:
         """Note that the planner's tree has a new node.
 
         Args:
@@ -145,9 +152,11 @@ class HeatmapSampler:
             y: of the node, world.
             in_goal: whether the node is in the goal.
             covers: whether it does instead of a sample there, which its heading may not do.
+
+        Returns:
+            How many nodes the tree has as far as is known; 0 while it is not watched.
         """
-        if self._mixture is not None:
-            self._mixture.on_new_node(x, y, in_goal, covers)
+        return 0 if self._mixture is None else self._mixture.on_new_node(x, y, in_goal, covers)
 
     def next(self) -> tuple[float, float]:
         """Return the next sample, (x, y), world."""
@@ -158,8 +167,10 @@ class HeatmapSampler:
             point = self._next_learned(best)
             if point is not None:
                 self._learned_count += 1
+                self.is_learned = True
                 return point
         self._count_uniform()
+        self.is_learned = False
         point = self._uniform.next(best, None)
         assert point is not None, "nothing was rejected"
         return point

@@ -1,0 +1,101 @@
+"""Poses that a planner's tree reaches in one step, for robots that drive forwards alone."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ..sampling.sampler import HeatmapSampler
+from .compat import new_state, ob, typed_state
+from .goal_approach import turning_radius
+from .planner_kinds import plans_controls
+from .states import state_access
+
+if TYPE_CHECKING:
+    from ..sampling.tree_extension import TreeExtension
+
+# OMPL's range of a planner that was given none, as a fraction of the extent of the space.
+_OMPL_RANGE = 0.2
+# Motions that are looked at for one pose: that costs less than to extend the tree in vain.
+_MOST_LOOKS = 6
+
+
+class PoseExtension:
+    """Set states to poses of a heat map that a planner's tree reaches without a collision.
+
+    Args:
+        si: the space information.
+        sampler: of the planner.
+        extension: proposes the poses.
+    """
+
+    def __init__(self, si: Any, sampler: HeatmapSampler, extension: TreeExtension) -> None:
+        self._si = si
+        self._states = state_access(si.getStateSpace())
+        self._sampler, self._extension = sampler, extension
+        self._handle = new_state(si.getStateSpace())
+        self._node = typed_state(self._handle)
+
+    def add(self, state: Any, count: int) -> None:
+        """Note a new node of the tree.
+
+        Args:
+            state: of the node.
+            count: how many nodes the tree has with it.
+        """
+        self._extension.add(*self._states.read_pose(state), count)
+
+    def move(self, state: Any) -> bool:
+        """Set a state to such a pose, as a learned sample; return whether there is one.
+
+        Args:
+            state: of the space, changed in place.
+        """
+        covered = self._sampler.covered
+        if covered is None:
+            return False
+        for _ in range(_MOST_LOOKS):
+            found = self._extension.propose(covered)
+            if found is None:
+                return False
+            node, pose = found
+            self._states.write_pose(self._node, *node)
+            self._states.write_pose(state, *pose)
+            if self._si.checkMotion(self._node, state):
+                return True
+        return False
+
+
+def pose_extension(planner: Any, sampler: HeatmapSampler) -> PoseExtension | None:
+    """Return the extension of a planner's tree.
+
+    Args:
+        planner: an OMPL planner.
+        sampler: of the planner.
+
+    Returns:
+        None where states are not those of Dubins curves, where the planner plans controls, and
+        where all headings are uniform or the tree is not watched.
+    """
+    si, spread = planner.getSpaceInformation(), sampler.spread
+    space = si.getStateSpace()
+    if not isinstance(space, ob.DubinsStateSpace):
+        return None
+    if plans_controls(planner) or sampler.covered is None or spread.uniform_fraction == 1:
+        return None
+    from ..sampling.tree_extension import TreeExtension  # compiled
+
+    radius, range = turning_radius(space), range_of(planner)
+    extension = TreeExtension(sampler.heatmap, radius, range, sampler.rng)
+    return PoseExtension(si, sampler, extension)
+
+
+def range_of(planner: Any) -> float:
+    """Return how far a planner extends its tree at most, world units.
+
+    Before its setup a planner may have no range yet; OMPL then takes a fraction of the space.
+
+    Args:
+        planner: an OMPL planner.
+    """
+    range = planner.getRange() if hasattr(planner, "getRange") else 0.0
+    return float(range or _OMPL_RANGE * planner.getSpaceInformation().getMaximumExtent())
