@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from .sampling.heatmap import Heatmap
     from .sampling.options import Adaptation, HeadingSpread, SamplerOptions
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 
 __all__ = [
     "Adaptation",
