@@ -84,8 +84,9 @@ def pose_extension(planner: Any, sampler: HeatmapSampler) -> PoseExtension | Non
         return None
     from ..sampling.tree_extension import TreeExtension  # compiled
 
-    radius, range = turning_radius(space), range_of(planner)
-    extension = TreeExtension(sampler.heatmap, radius, range, sampler.rng)
+    extension = TreeExtension(
+        sampler.heatmap, turning_radius(space), range_of(planner), sampler.rng
+    )
     return PoseExtension(si, sampler, extension)
 
 

@@ -14,7 +14,7 @@ from .heatmap import Heatmap
 
 # Pairs of arcs that are tried for one pose.
 _TRIES = 512
-# The shortest way that is tried, as a fraction of the range.
+# The shortest way that is tried, as a fraction of the longest.
 _SHORTEST = 0.1
 # Nodes for which there is room at first.
 _FIRST_ROOM = 256
@@ -33,7 +33,7 @@ class TreeExtension:
     Args:
         heatmap: with the headings that are to be followed.
         radius: the turning radius, world units.
-        range: how long both arcs are together at most, world units.
+        longest: how long both arcs are together at most, world units.
         rng: the generator.
 
     Example:
@@ -50,7 +50,7 @@ class TreeExtension:
         self,
         heatmap: Heatmap,
         radius: float,
-        range: float,
+        longest: float,
         rng: np.random.Generator,
     ) -> None:
         grid = heatmap.grid
@@ -58,7 +58,7 @@ class TreeExtension:
         heading = np.full(grid.shape, np.nan, np.float32) if known is None else known
         self._offers = np.where(heatmap.values > 0, heading, np.float32(np.inf))
         self._affine = np.array(grid.pixel_from_world)
-        self._radius, self._range = radius, float(range)
+        self._radius, self._longest = radius, float(longest)
         self._rng = rng
         self._nodes, self._count = np.empty((_FIRST_ROOM, 3)), 0
         self.propose(bytearray(grid.width * grid.height))  # compiled before it is needed
@@ -93,7 +93,7 @@ class TreeExtension:
         nodes = self._nodes[: self._count]
         mask = np.frombuffer(covered, np.uint8).reshape(self._offers.shape)
         number, *pose = _find(
-            nodes, _TRIES, self._rng, self._affine, self._offers, mask, self._radius, self._range
+            nodes, _TRIES, self._rng, self._affine, self._offers, mask, self._radius, self._longest
         )
         if number < 0:
             return None
@@ -110,7 +110,7 @@ def _find(
     offers: NDArray[np.float32],
     covered: NDArray[np.uint8],
     radius: float,
-    range: float,
+    longest: float,
 ) -> tuple[int, float, float, float]:  # pragma: no cover
     """Return the number of a node and a pose that is reached from it; -1 for none.
 
@@ -122,15 +122,15 @@ def _find(
         offers: of the pixels the heading, NaN for any, infinite for none.
         covered: of the pixels, 1 where the tree is.
         radius: the turning radius.
-        range: the greatest length.
+        longest: the greatest length of both arcs.
     """
     height, width = offers.shape
     if len(nodes) == 0:
         return -1, 0.0, 0.0, 0.0
-    for _ in np.arange(tries):
+    for _ in range(tries):
         number = int(rng.random() * len(nodes))
         x, y, yaw = nodes[number]
-        length = range * (_SHORTEST + (1 - _SHORTEST) * rng.random())
+        length = longest * (_SHORTEST + (1 - _SHORTEST) * rng.random())
         first = rng.random()
         for part in (first, 1 - first):
             x, y, yaw = _follow_arc(x, y, yaw, part * length, (2 * rng.random() - 1) / radius)
