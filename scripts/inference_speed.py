@@ -35,6 +35,7 @@ from cbagan_ompl.planning.workspace import Workspace
 TIMES = ("first", "next", "of 64", "attach")
 COLUMNS = (*TIMES, "memory")
 BATCH = 64
+LARGEST = 1024
 
 
 def main() -> None:
@@ -102,10 +103,14 @@ def status(name: str) -> float:
 
 
 def random_tasks(size: int) -> Iterator[tuple[NDArray[np.bool_], NDArray[np.float64]]]:
-    """Yield maps, and for each the tasks, (64, 2, 2), a third of the side apart at least."""
+    """Yield maps, and for each the tasks, (64, 2, 2), a third of the side apart at least.
+
+    Maps of more than 1024 pixels, which take minutes to generate, are enlarged ones.
+    """
     for seed, name in enumerate(GENERATORS):
         rng = np.random.default_rng(seed)
-        free = MAP_GENERATORS[name](rng, size, size)
+        side = min(size, LARGEST)
+        free = MAP_GENERATORS[name](rng, side, side).repeat(size // side, 0).repeat(size // side, 1)
         pixels = np.argwhere(free)[:, ::-1] + 0.5
         pairs = rng.choice(pixels, (8 * BATCH, 2))
         far = np.hypot(*(pairs[:, 1] - pairs[:, 0]).T) > size / 3
