@@ -17,6 +17,7 @@ import argparse
 import json
 from collections import defaultdict
 from dataclasses import asdict, replace
+from itertools import product
 from math import inf
 from pathlib import Path
 from time import process_time
@@ -59,6 +60,7 @@ UNUSED = {
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, default=20, help="tasks")
+    parser.add_argument("--seeds", type=int, default=1, help="runs of each task")
     parser.add_argument("--planners", default="RRTstar,RRT")
     parser.add_argument("--time", type=float, default=0.7, help="CPU seconds of a run")
     parser.add_argument("--rows", metavar="FILE", default="headings.jsonl")
@@ -71,22 +73,21 @@ def main() -> None:
     done = [json.loads(line) for line in rows.read_text().splitlines()] if rows.exists() else []
     known = {tuple(row["key"]) for row in done}
     tasks = list(generated_tasks(args.count))
-    for planner in args.planners.split(","):
-        for number, task in enumerate(tasks):
-            for space in UNUSED:
-                for way in ways_of(space):
-                    key = space, planner, way, number
-                    if key not in known:
-                        done.append({"key": key, **measure(task, key, predictor, args.time)})
-                        with rows.open("a") as file:
-                            file.write(json.dumps(done[-1]) + "\n")
+    runs = product(args.planners.split(","), range(args.seeds), range(len(tasks)), UNUSED)
+    for planner, seed, number, space in runs:
+        for way in ways_of(space):
+            key = space, planner, way, number, seed
+            if key not in known:
+                done.append({"key": key, **measure(tasks[number], key, predictor, args.time)})
+                with rows.open("a") as file:
+                    file.write(json.dumps(done[-1]) + "\n")
     summary = summarise(done, args.time)
     for row in summary:
         print(row)
     defaults = asdict(HeadingSpread())
-    head = {"ompl": compat.ompl_version(), "time": args.time, "tasks": args.count}
     if args.json is not None:
-        write_json(args.json, head | {"defaults": defaults, "rows": summary})
+        head = {"ompl": compat.ompl_version(), "time": args.time, "defaults": defaults}
+        write_json(args.json, head | {"tasks": args.count, "seeds": args.seeds, "rows": summary})
     if args.plot is not None:
         plot(summary, defaults, args.plot)
 
@@ -100,18 +101,19 @@ def ways_of(space: str) -> list[str]:
 
 
 def measure(
-    task: PoseTask, key: tuple[str, str, str, int], predictor: Predictor, limit: float
+    task: PoseTask, key: tuple[str, str, str, int, int], predictor: Predictor, limit: float
 ) -> dict[str, Any]:
     """Return the time until the first path; None without one."""
-    space, planner, way, number = key
+    space, planner, way, number, repetition = key
+    seed = number + 1000 * repetition
     robot = Robot.rectangle(LENGTH, WIDTH, **SPACES[space])
-    compat.seed_ompl(number + 1)
+    compat.seed_ompl(seed + 1)
     setup = make_setup(task, robot, planner)
     if way == OWN:
         return {"first": first(solve(setup, limit, True), 0.0)}
     began = process_time()
     heatmap = make_heatmap(task, robot, way, predictor)
-    with attach(setup, heatmap, seed=number, heading=spread_of(way)):
+    with attach(setup, heatmap, seed=seed, heading=spread_of(way)):
         inference = process_time() - began
         costs = solve(setup, limit, True)
     return {"first": first(costs, inference)}
@@ -159,7 +161,7 @@ def summarise(done: list[dict[str, Any]], limit: float) -> list[dict[str, Any]]:
     """Return success, quartiles of the times and their geometric mean, by space and planner."""
     groups: dict[tuple[str, str, str], list[float]] = defaultdict(list)
     for row in done:
-        space, planner, way, _ = row["key"]
+        space, planner, way, *_ = row["key"]
         groups[space, planner, way].append(inf if row["first"] is None else row["first"])
     summary = []
     for (space, planner, way), times in groups.items():
@@ -206,7 +208,7 @@ def plot(summary: list[dict[str, Any]], defaults: dict[str, float], path: str) -
         axes.axvline(defaults[name], color="0.7", lw=0.8, zorder=0)
         axes.set(xlabel=name, yscale="log")
     figure.axes[0].set_ylabel("first path, ms (geometric mean)")
-    figure.axes[-1].legend(fontsize=6)
+    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=6)
     figure.savefig(path, dpi=110)
 
 
