@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from statistics import median
+
 from suite_tables import VERSIONS, Json, read
 
 from cbagan_ompl.common.markdown import table
@@ -61,14 +63,14 @@ def paper_networks() -> str:
         "sagan": "SAGAN: self-attention",
         "segmentation": "CBAGAN without discriminators",
     }
-    rows = []
+    networks, rows = read("paper_networks.json")["networks"], []
     for key, name in names.items():
-        row = read("paper_networks.json")["networks"][key]
+        row = networks[key]
         means = [f"{row[score][0]:.3f}" for score in ("dice", "right_pixels")]
         connected = f"{100 * row['connectivity'][0]:.1f} %"
         nodes = [spread(row[f"{way}_nodes_ratio"], ".2f") for way in ("plain", "adapted")]
-        inference = sorted(run["plain"]["inference_ms"][0] for run in row["seeds"])
-        times = [f"{inference[len(inference) // 2]:.1f} ms", f"{row['epoch_s'] / 3:.0f} min"]
+        inference = median(run["plain"]["inference_ms"][0] for run in row["seeds"])
+        times = [f"{inference:.1f} ms", f"{row['epoch_s'] / 3:.0f} min"]
         rows.append([name, spread(row["iou"], ".3f"), *means, connected, *nodes, *times])
     header = ["network", "IoU", "Dice", "right pixels", "connected (8)", "RRT nodes, not adapted"]
     return table([*header, "RRT nodes, adapted", "inference", "training"], rows)

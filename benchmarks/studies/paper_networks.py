@@ -35,14 +35,10 @@ from cbagan_ompl.training.export import export
 from cbagan_ompl.training.loop import train
 from cbagan_ompl.training.task_sources import DatasetSource
 
-#: Networks by the names of the rows, and what is changed in the preset.
-VARIANTS: dict[str, dict[str, Any]] = {
-    "cbagan": {},
-    "sa": {},
-    "ca": {},
-    "none": {},
-    "sagan": {},
-    "segmentation": {"adversarial_weight": 0.0},
+#: The network of each row, and what is changed in the preset.
+VARIANTS: dict[str, tuple[str, dict[str, Any]]] = {
+    **{name: (name, {}) for name in ("cbagan", "sa", "ca", "none", "sagan")},
+    "segmentation": ("cbagan", {"adversarial_weight": 0.0}),
 }
 
 
@@ -79,8 +75,8 @@ def main() -> None:
 
 def recipe(name: str, epochs: int | None) -> TrainingConfig:
     """Return the recipe of a row."""
-    network = "cbagan" if name == "segmentation" else name
-    config = TrainingConfig.preset("paper").with_network(network).updated(VARIANTS[name])
+    network, changes = VARIANTS[name]
+    config = TrainingConfig.preset("paper").with_network(network).updated(changes)
     return config if epochs is None else config.updated({"epochs": epochs})
 
 

@@ -8,13 +8,12 @@ from ..sampling.sampler import HeatmapSampler
 from .compat import new_state, ob, typed_state
 from .goal_approach import turning_radius
 from .planner_kinds import plans_controls
+from .problem import range_of
 from .states import state_access
 
 if TYPE_CHECKING:
     from ..sampling.tree_extension import TreeExtension
 
-# OMPL's range of a planner that was given none, as a fraction of the extent of the space.
-_OMPL_RANGE = 0.2
 # Motions that are looked at for one pose: that costs less than to extend the tree in vain.
 _MOST_LOOKS = 6
 
@@ -88,15 +87,3 @@ def pose_extension(planner: Any, sampler: HeatmapSampler) -> PoseExtension | Non
         sampler.heatmap, turning_radius(space), range_of(planner), sampler.rng
     )
     return PoseExtension(si, sampler, extension)
-
-
-def range_of(planner: Any) -> float:
-    """Return how far a planner extends its tree at most, world units.
-
-    Before its setup a planner may have no range yet; OMPL then takes a fraction of the space.
-
-    Args:
-        planner: an OMPL planner.
-    """
-    range = planner.getRange() if hasattr(planner, "getRange") else 0.0
-    return float(range or _OMPL_RANGE * planner.getSpaceInformation().getMaximumExtent())

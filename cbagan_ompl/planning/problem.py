@@ -12,6 +12,9 @@ from .workspace import Endpoints, Workspace
 
 _LEAST_THRESHOLD = float(np.finfo(np.float64).eps)
 
+# OMPL's range of a planner that was given none, as a fraction of the extent of the space.
+_OMPL_RANGE = 0.2
+
 # Setters of every planner that set no parameter.
 _NO_PARAMETERS = frozenset(
     {"setName", "setOptimizationObjective", "setProblemDefinition", "settings", "setup"}
@@ -59,6 +62,18 @@ def set_range(planner: Any, range: float) -> bool:
     if has_range:
         planner.setRange(float(range))
     return has_range
+
+
+def range_of(planner: Any) -> float:
+    """Return how far a planner extends its tree at most, world units.
+
+    Before its setup a planner may have no range yet; OMPL then takes a fraction of the space.
+
+    Args:
+        planner: an OMPL planner.
+    """
+    range = planner.getRange() if hasattr(planner, "getRange") else 0.0
+    return float(range or _OMPL_RANGE * planner.getSpaceInformation().getMaximumExtent())
 
 
 def stop_at_optimum(setup: Any, endpoints: Endpoints, tolerance: float) -> None:

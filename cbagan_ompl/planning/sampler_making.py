@@ -17,8 +17,8 @@ from .attachable import check_frames
 from .hooks import BOUNDS_STEERING, GOAL_INJECTION, samples_are_nodes
 from .monitor import PlannerMonitor
 from .planner_kinds import plans_controls
-from .pose_extension import range_of
 from .pose_headings import with_headings
+from .problem import range_of
 from .sample_budget import budget_of, needs_many_poses
 from .states import StateAccess, drives_backwards, position_bounds, state_access
 

@@ -7,12 +7,11 @@ from numpy.typing import NDArray
 
 from ..maps.grid_map import GridMap
 
-# Pixels whose weights are summed up together, and samples that are looked up in blocks at a time.
-_BLOCK, _LOOKED_UP = 16, 4096
-
-
 #: Two pixels (column, row).
 PixelPair = tuple[tuple[int, int], tuple[int, int]]
+
+# Pixels whose weights are summed up together, and samples that are looked up in blocks at a time.
+_BLOCK, _LOOKED_UP = 16, 4096
 
 
 class WeightedPixels:

@@ -84,7 +84,8 @@ def export(
     generator, record = _read_source(Path(checkpoint), target.stem, note)
     make_folder(target.parent, ModelError)
     _check_outputs(target, as_path(checkpoint), force)
-    model, card = make_region_model(generator), target.with_suffix(".md")
+    model = make_region_model(generator)
+    _, card, _ = exported_files(target)
     is_onnx = formats[target.suffix] is ModelFormat.ONNX
     if is_onnx:
         save_onnx(model, target, record)
@@ -121,7 +122,7 @@ def add_guarantee(path: str | PathLike[str], guarantee: Guarantee) -> dict[str, 
             content = json.dumps(record, indent=1).encode() if is_record else old.read(member)
             new.writestr(zipfile.ZipInfo(member.filename), content)
     write_atomically(target, buffer.getvalue(), ModelError)
-    card = target.with_suffix(".md")
+    _, card, _ = exported_files(target)
     if is_card(card):
         text = with_guarantee(read_text(card, ModelError, MAX_CARD_BYTES), record)
         write_atomically(card, text, ModelError)

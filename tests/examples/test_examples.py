@@ -9,10 +9,10 @@ import sys
 from math import pi
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
+from helpers.scripts import load_module
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 # What each prints, and the files that it leaves in the working directory.
@@ -52,15 +52,6 @@ def test_example_runs(name: str, tmp_path: Path) -> None:
     assert expected in done.stdout
     assert "Traceback" not in done.stderr
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(files)
-
-
-def load_module(path: Path) -> Any:
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def test_messages_of_ros_are_translated_without_ros() -> None:

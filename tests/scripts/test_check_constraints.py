@@ -2,30 +2,19 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
 from itertools import chain
 from pathlib import Path
-from types import ModuleType
 
 import pytest
+from helpers.scripts import load_module
 from packaging.requirements import Requirement
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "constraints.txt").read_text(encoding="utf-8")
 
 
-def load_script() -> ModuleType:
-    path = ROOT / "scripts" / "check_constraints.py"
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-SCRIPT = load_script()
+SCRIPT = load_module(ROOT / "scripts" / "check_constraints.py")
 
 
 def test_pins_of_a_version() -> None:
