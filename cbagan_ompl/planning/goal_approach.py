@@ -17,8 +17,11 @@ from .states import drives_backwards, has_turning_radius, pose_space, state_acce
 # Lengths of the shortest curves that turn a robot by pi in place, in turning radii.
 _DUBINS_TURN, _REEDS_SHEPP_TURN = 7 * pi / 3, pi
 
-# Motions that are tried before the goal itself is taken.
+# Motions of random length and direction that are tried before the goal itself is taken.
 _MOST_TRIES = 10
+
+# How near to the goal a tree is for its samples to be poses before it, in ranges.
+_NEAR = 2.0
 
 Pose = tuple[float, float, float]
 #: Moves a pose back along a motion that ends in it, at random.
@@ -33,19 +36,18 @@ class GoalApproach:
     again. So once the tree is near, some of its samples are poses before the goal.
 
     Args:
-        si: the space information.
-        sampler: of the planner.
+        space: an OMPL state space of poses.
+        sampler: of the planner. Poses whose position is blocked on its map are not proposed.
         step_back: proposes the poses.
         near: distance to the goal from which on a node is near it.
     """
 
-    def __init__(self, si: Any, sampler: HeatmapSampler, step_back: StepBack, near: float) -> None:
-        space = si.getStateSpace()
-        self._si, self._step_back, self._near = si, step_back, near
+    def __init__(
+        self, space: Any, sampler: HeatmapSampler, step_back: StepBack, near: float
+    ) -> None:
+        self._space, self._step_back, self._near = space, step_back, near
         self._states = state_access(space)
-        self._handle = new_state(space)
-        self._goal = typed_state(self._handle)
-        self._chance = sampler.chance
+        self._grid, self._chance = sampler.heatmap.grid, sampler.chance
         self._fraction = sampler.spread.approach_fraction
         self._is_near = False
 
@@ -63,27 +65,19 @@ class GoalApproach:
         return self._is_near and self._chance() < self._fraction
 
     def move_back(self, state: Any) -> None:
-        """Move a goal state back, at random; it stays where it is if no motion was free.
+        """Move a goal state back, at random; it stays where it is if there is no room.
 
         Args:
             state: of the space, changed in place.
         """
         goal = self._states.read_pose(state)
-        self._states.write_pose(self._goal, *goal)
         for _ in range(_MOST_TRIES):
-            self._states.write_pose(state, *self._step_back(goal))
-            if self._is_way(state):
-                return
+            pose = self._step_back(goal)
+            if self._grid.is_free(pose[:2]):
+                self._states.write_pose(state, *pose)
+                if self._space.satisfiesBounds(state):
+                    return
         self._states.write_pose(state, *goal)
-
-    def _is_way(self, state: Any) -> bool:
-        """Return whether the motion from a state to the goal is free.
-
-        OMPL's own check of motions takes their beginning to be valid, and knows of no bounds.
-        """
-        si = self._si
-        is_valid = si.satisfiesBounds(state) and si.isValid(state)
-        return bool(is_valid and si.checkMotion(state, self._goal))
 
 
 def turning_radius(space: Any) -> float:
@@ -121,8 +115,8 @@ def goal_approach(planner: Any, sampler: HeatmapSampler) -> GoalApproach | None:
         None where states are no poses, where the planner plans controls, and where the approach is
         switched off, by itself or with all headings.
     """
-    si, spread = planner.getSpaceInformation(), sampler.spread
-    space, longest = si.getStateSpace(), range_of(planner)
+    space, spread = planner.getSpaceInformation().getStateSpace(), sampler.spread
+    longest = range_of(planner)
     is_on = spread.approach_fraction > 0 and spread.uniform_fraction < 1
     if not is_on or pose_space(space) is None or plans_controls(planner):
         return None
@@ -130,7 +124,7 @@ def goal_approach(planner: Any, sampler: HeatmapSampler) -> GoalApproach | None:
         step_back = _arc_back(turning_radius(space), drives_backwards(space), sampler.chance)
     else:
         step_back = _line_back(longest, sampler.chance)
-    return GoalApproach(si, sampler, step_back, longest)
+    return GoalApproach(space, sampler, step_back, _NEAR * longest)
 
 
 def _arc_back(radius: float, reverses: bool, chance: Callable[[], float]) -> StepBack:
