@@ -39,12 +39,14 @@ def paint_heatmap(
     """
     result = np.zeros(grid.shape, np.float32)
     # Pages of memory are used when they are first written to.
-    indices = np.empty(result.size + 1, np.intp)
-    count = _paint(np.ascontiguousarray(values), grid.free, np.float32(least), result, indices)
+    support, found = np.empty(result.size + 1, np.intp), np.empty(result.size + 1, np.float32)
+    smallest = np.float32(least)
+    count = _paint(np.ascontiguousarray(values), grid.free, smallest, result, support, found)
     if not count:
         return None
     result.setflags(write=False)
-    support = indices[:count].copy()
+    for array in support, found:
+        array.resize(count, refcheck=False)  # in place, where a copy would take longer than these
     # All that Heatmap() would check is known: it reads every pixel.
     heatmap: Heatmap
     if directions is None:
@@ -55,7 +57,7 @@ def paint_heatmap(
         painted.directions, painted.patches, painted.painted = directions, patches, support
     heatmap.values, heatmap.grid = result, grid
     heatmap.guarantee = None
-    heatmap.support = support
+    heatmap.support, heatmap.support_values = support, found
     return heatmap
 
 
@@ -66,6 +68,7 @@ def _paint(
     least: np.float32,
     result: NDArray[np.float32],
     indices: NDArray[np.intp],
+    found: NDArray[np.float32],
 ) -> int:  # pragma: no cover
     """Write the values of a heat map; return how many pixels have one.
 
@@ -75,6 +78,7 @@ def _paint(
         least: smallest value that is written.
         result: (H, W), zeros.
         indices: becomes the flat indices of the pixels with a value, in order.
+        found: becomes the values of these pixels.
     """
     rows, columns = values.shape
     height, width = free.shape
@@ -106,7 +110,7 @@ def _paint(
         # Without a branch, which would be guessed wrong.
         number = row * width + begin
         for i in range(end - begin):
-            indices[count] = number + i
+            indices[count], found[count] = number + i, target[i]
             count += target[i] > 0
     return count
 
