@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from cbagan_ompl import load_model
 from cbagan_ompl.inference.bundled_models import bundled_model
 from cbagan_ompl.inference.convolutions import convolve_maps_once, use_onednn
 from cbagan_ompl.inference.graphs import TorchGraphs
@@ -46,6 +47,9 @@ def test_features_of_a_map_are_convolved_when_it_is_read() -> None:
             results.append((maps.arrays[0], pipeline.paint(maps, ends[:1], ends[1:])))
     (features, painted), (convolved, same) = results
     assert joint_channels(other) == [before[0] - features.shape[1]]
+    assert joint_channels(load_model(bundled_model().with_suffix(".pt")).module) == joint_channels(
+        other
+    )
     assert not np.allclose(features, convolved)
     assert painted.region.max() > 0.5
     np.testing.assert_allclose(same.region, painted.region, rtol=0, atol=1e-6)
