@@ -108,14 +108,16 @@ def main() -> None:
     robots = {name: Robot.rectangle(*sides) for name, sides in RECTANGLES.items()}
     rows: dict[tuple[str, str], list[dict[str, Any]]] = defaultdict(list)
     seconds: list[float] = []
-    for task in tqdm(generated_tasks(robots, args.tasks, args.seed), total=2 * args.tasks):
+    maps = dict.fromkeys(SETS, 0)
+    for task in tqdm(generated_tasks(robots, args.tasks, args.seed, maps), total=2 * args.tasks):
         for name, robot in robots.items():
             began = process_time()
             rows[task.group, name].append(measure(predictor, task, robot, task.lattices[name]))
             seconds.append(process_time() - began)
     result = {
-        "tasks": {group: len(rows[group, SLENDER]) for group in SETS},
         "seed": args.seed,
+        "tasks": {group: len(rows[group, SLENDER]) for group in SETS},
+        "maps_generated": maps,
         "rectangles": {name: list(sides) for name, sides in RECTANGLES.items()},
         "rows": [row for group in SETS for name in robots for row in summarize(group, name, rows)],
     }
@@ -126,8 +128,13 @@ def main() -> None:
         write_json(args.json, result)
 
 
-def generated_tasks(robots: dict[str, Robot], count: int, seed: int) -> Iterator[Task]:
-    """Yield as many tasks of each set, each on a map of its own."""
+def generated_tasks(
+    robots: dict[str, Robot], count: int, seed: int, maps: dict[str, int]
+) -> Iterator[Task]:
+    """Yield as many tasks of each set, each on a map of its own.
+
+    How many maps were generated for each set, with a task or without, is counted in ``maps``.
+    """
     found = dict.fromkeys(SETS, 0)
     number = 0
     while min(found.values()) < count:
@@ -137,6 +144,7 @@ def generated_tasks(robots: dict[str, Robot], count: int, seed: int) -> Iterator
         number += 1
         if found[group] == count:
             continue
+        maps[group] += 1
         half = MAP_GENERATORS[name](rng, SIDE // 2, SIDE // 2)
         grid = GridMap(np.kron(half, np.ones((2, 2), bool)), name=f"{name}-{number}")
         lattices = {key: make_lattice(grid, robot) for key, robot in robots.items()}
@@ -158,14 +166,19 @@ def sample_ends(
     if not len(starts):
         return None
     start = to_pixel(starts[rng.integers(len(starts))])
-    costs = {name: one.costs_from(start).min(axis=0) for name, one in lattices.items()}
-    farthest = np.maximum.reduce(list(costs.values()))
     rows, columns = np.ogrid[: grid.height, : grid.width]
     straight = np.hypot(columns - start[0], rows - start[1])
-    chosen = np.isfinite(farthest) & (straight >= NEAREST)
+    costs = lattices[SLENDER].costs_from(start).min(axis=0)
+    chosen = np.isfinite(costs) & (straight >= NEAREST)
     if group == "gaps":
-        chosen &= costs[SLENDER] >= FARTHER * disc_costs(grid, slender, start)
-    goals = pixels_of(chosen)
+        chosen &= costs >= FARTHER * disc_costs(grid, slender, start)
+    if not chosen.any():
+        return None
+    others = [
+        one.costs_from(start).min(axis=0) for name, one in lattices.items() if name != SLENDER
+    ]
+    farthest = np.maximum.reduce([costs, *others])
+    goals = pixels_of(chosen & np.isfinite(farthest))
     if not len(goals):
         return None
     drawn = [to_pixel(goals[at]) for at in rng.integers(len(goals), size=GOALS)]

@@ -17,10 +17,10 @@ turning. Past the corner of an obstacle a path may be too near by less than a pi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 from heapq import heapify, heappop, heappush
 from math import ceil, pi
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -43,8 +43,7 @@ Costs = NDArray[np.float32]
 Mask = NDArray[np.uint8]
 
 
-@dataclass
-class PoseLattice:
+class PoseLattice(NamedTuple):
     """What a rectangle can do on a map.
 
     Attributes:
