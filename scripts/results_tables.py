@@ -19,7 +19,7 @@ from inference_speed import speed_table as speed_of_models
 from planner_tables import Json, ratios_table
 from robot_tables import car_suites, robot_paths
 from search_speed import speed_table
-from study_tables import control, overlap, paper_networks, spread
+from study_tables import control, footprints, overlap, paper_networks, spread
 from suite_tables import (
     ROOT,
     VERSIONS,
@@ -351,6 +351,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "inference_speed": lambda: speed_of_models(read("inference_speed.json")),
     "robot_paths": robot_paths,
     "car_suites": car_suites,
+    "footprints": footprints,
     "control": control,
     "overlap": overlap,
     "search_speed": lambda: speed_table(read("search_speed.json")),

@@ -1,4 +1,4 @@
-"""The tables of planning with controls, of overlapped inference and of the paper's networks."""
+"""The tables of controls, of overlapped inference, of the paper's networks and of footprints."""
 
 from __future__ import annotations
 
@@ -74,6 +74,20 @@ def paper_networks() -> str:
         rows.append([name, spread(row["iou"], ".3f"), *means, connected, *nodes, *times])
     header = ["network", "IoU", "Dice", "right pixels", "connected (8)", "RRT nodes, not adapted"]
     return table([*header, "RRT nodes, adapted", "inference", "training"], rows)
+
+
+def footprints() -> str:
+    """Return how well the region fits rectangles that turn."""
+    rows = []
+    for row in read("footprints.json")["rows"]:
+        name = f"**{row['heatmap']}**" if row["heatmap"] == "as shipped" else row["heatmap"]
+        iou = spread(row["iou"], ".2f")
+        shares = [f"{row[score][0]:.2f}" for score in ("recall", "precision")]
+        paths = [spread([100 * share for share in row["within"]], ".0f"), f"{row['held'][0]:.0%}"]
+        longer = "-" if row["ratio"] is None else f"{100 * (row['ratio'][0] - 1):.1f} %"
+        rows.append([row["tasks"], row["rectangle"], name, iou, *shares, *paths, longer])
+    header = ["tasks", "rectangle", "network on, or heat map", "IoU", "recall", "precision"]
+    return table([*header, "path within 5 % (%)", "any path", "longer, median"], rows)
 
 
 def spread(interval: list[float], form: str) -> str:

@@ -6,18 +6,24 @@ The network knows of a rectangle only that obstacles are inflated. The truth is 
 the positions through which the rectangle has a path, turning as it has to, that is at most 5 %
 and a pixel longer than its shortest (`pose_lattice.py`); the labels of the training are the same
 for a point. Rectangles of three aspect ratios and about the same area, on the same tasks, of which
-there are two sets:
+there are three sets. In all of them each rectangle fits at the start and gets from there to the
+goal.
 
-* ``random``: start and goal at random where every rectangle fits and gets from one to the other;
-  of twenty goals the first whose path is 1.3 times as long as the distance, or the last one.
+* ``random``: goals at random; of twenty the first whose path is 1.3 times as long as the distance,
+  or the last one.
 * ``gaps``: goals at random among those to which the slender rectangle has to go at least 1.1 times
   as far as a disc of its width: it does not get through a gap, or around a corner, where the disc
-  does. They are chosen against what the package does, so they say where it fails, not how often.
+  does.
+* ``border``: the same, where it is the border of the map that the rectangle does not get along: it
+  has to be all on the map, but inflation takes the border for no obstacle.
+
+The last two are chosen against what the package does, so they say where it fails, not how often.
 
 Heat maps, all with the threshold of the package, and on the map of positions:
 
 * ``as shipped``: ``Predictor.predict(..., robot=robot)``. The network sees the map inflated by the
   whole inscribed radius where that connects start and goal, else the map of positions.
+* ``border blocked``: the same with the border for an obstacle.
 * the network on other maps: that of positions; inflated by the circumscribed radius, or midway
   between both radii, each where it connects, else as shipped; that of the positions which
   the rectangle reaches from the start on the lattice; the raw map, as for a point.
@@ -26,7 +32,8 @@ Heat maps, all with the threshold of the package, and on the map of positions:
 Reported are the intersection over union with the truth, recall and precision, how many regions hold
 a path of the rectangle and one within 5 % of its shortest, and how much longer the path in the
 region is, where there is one; in brackets bootstrap intervals of 95 % over the tasks, each of which
-has a map of its own. ``difference`` is from ``as shipped``, by pairs.
+has a map of its own. ``used`` is the fraction of tasks in which the inflated map connects, and
+``difference`` that from ``as shipped``, by pairs.
 """
 
 from __future__ import annotations
@@ -55,16 +62,14 @@ from cbagan_ompl.robots.poses import position_map
 #: Length and width in pixels by the aspect ratio, areas of 49 and 50 pixels.
 RECTANGLES = {"1:1": (7.0, 7.0), "2:1": (10.0, 5.0), "4:1": (14.0, 3.5)}
 SLENDER = "4:1"
-# Maps with walls and passages, generated at half their size and enlarged for the robots.
-GENERATORS = (
-    "bug_trap",
+# Kinds of maps with walls and passages, and open ones, where ways along the border are common.
+WALLS = (
     "caves",
     "cell_maze",
     "city",
     "curved_walls",
     "halls",
     "maze",
-    "narrow_passage",
     "offices",
     "room_grid",
     "rooms",
@@ -72,15 +77,16 @@ GENERATORS = (
     "walls_with_gaps",
     "warehouse",
 )
+OPEN = ("blocks", "bug_trap", "clutter", "ellipses", "narrow_passage", "tl_shapes", "triangles")
+SETS = {"random": (*WALLS, *OPEN), "gaps": WALLS, "border": OPEN}
 SIDE, NEAREST, DETOUR, GOALS = 256, 80.0, 1.3, 20
 # How much farther the slender rectangle has to go than a disc in the tasks with gaps.
 FARTHER = 1.1
-SETS = ("random", "gaps")
 # Training, validation and test use parts 0 to 2.
 PART = 12
 
 SHIPPED = "as shipped"
-MEASURES = ("iou", "recall", "precision", "held", "within")
+MEASURES = ("iou", "recall", "precision", "held", "within", "used")
 
 Pixel = tuple[int, int]
 Cells = NDArray[np.bool_]
@@ -91,7 +97,6 @@ class Task:
     """Start and goal, pixels (column, row), with what each rectangle can do on the map."""
 
     group: str
-    name: str
     grid: GridMap
     start: Pixel
     goal: Pixel
@@ -109,7 +114,9 @@ def main() -> None:
     rows: dict[tuple[str, str], list[dict[str, Any]]] = defaultdict(list)
     seconds: list[float] = []
     maps = dict.fromkeys(SETS, 0)
-    for task in tqdm(generated_tasks(robots, args.tasks, args.seed, maps), total=2 * args.tasks):
+    for task in tqdm(
+        generated_tasks(robots, args.tasks, args.seed, maps), total=len(SETS) * args.tasks
+    ):
         for name, robot in robots.items():
             began = process_time()
             rows[task.group, name].append(measure(predictor, task, robot, task.lattices[name]))
@@ -135,23 +142,18 @@ def generated_tasks(
 
     How many maps were generated for each set, with a task or without, is counted in ``maps``.
     """
-    found = dict.fromkeys(SETS, 0)
-    number = 0
-    while min(found.values()) < count:
-        group = SETS[number % len(SETS)]
-        rng = np.random.default_rng((seed, PART, number))
-        name = GENERATORS[number // len(SETS) % len(GENERATORS)]
-        number += 1
-        if found[group] == count:
-            continue
-        maps[group] += 1
-        half = MAP_GENERATORS[name](rng, SIDE // 2, SIDE // 2)
-        grid = GridMap(np.kron(half, np.ones((2, 2), bool)), name=f"{name}-{number}")
-        lattices = {key: make_lattice(grid, robot) for key, robot in robots.items()}
-        ends = sample_ends(rng, group, grid, robots[SLENDER], lattices)
-        if ends is not None:
-            found[group] += 1
-            yield Task(group, grid.name, grid, *ends, lattices)
+    for part, (group, generators) in enumerate(SETS.items(), PART):
+        found = 0
+        while found < count:
+            rng = np.random.default_rng((seed, part, maps[group]))
+            name = generators[maps[group] % len(generators)]
+            maps[group] += 1
+            grid = GridMap(MAP_GENERATORS[name](rng, SIDE, SIDE), name=name)
+            lattices = {key: make_lattice(grid, robot) for key, robot in robots.items()}
+            ends = sample_ends(rng, group, grid, robots[SLENDER], lattices)
+            if ends is not None:
+                found += 1
+                yield Task(group, grid, *ends, lattices)
 
 
 def sample_ends(
@@ -170,8 +172,11 @@ def sample_ends(
     straight = np.hypot(columns - start[0], rows - start[1])
     costs = lattices[SLENDER].costs_from(start).min(axis=0)
     chosen = np.isfinite(costs) & (straight >= NEAREST)
-    if group == "gaps":
-        chosen &= costs >= FARTHER * disc_costs(grid, slender, start)
+    if group != "random":
+        is_farther = costs >= FARTHER * disc_costs(grid, slender, start, with_border=True)
+        if group == "border":
+            is_farther = ~is_farther & (costs >= FARTHER * disc_costs(grid, slender, start))
+        chosen &= is_farther
     if not chosen.any():
         return None
     others = [
@@ -182,21 +187,30 @@ def sample_ends(
     if not len(goals):
         return None
     drawn = [to_pixel(goals[at]) for at in rng.integers(len(goals), size=GOALS)]
-    if group == "gaps":
+    if group != "random":
         return start, drawn[0]
     long = [goal for goal in drawn if farthest[goal[::-1]] >= DETOUR * straight[goal[::-1]]]
     return start, (long or drawn)[0]
 
 
-def disc_costs(grid: GridMap, robot: Robot, start: Pixel) -> NDArray[np.float32]:
+def disc_costs(
+    grid: GridMap, robot: Robot, start: Pixel, with_border: bool = False
+) -> NDArray[np.float32]:
     """Return how far a disc of the inscribed radius has to go; infinite where it does not fit."""
     try:
-        free = grid.inflated(robot.inscribed_radius).free
+        free = inflate(grid, robot.inscribed_radius, with_border).free
     except MapError:  # nothing is left
         free = np.zeros_like(grid.free)
     if not free[start[::-1]]:
         return np.full(grid.shape, np.inf, np.float32)
     return distance_field(free, start)
+
+
+def inflate(grid: GridMap, radius: float, with_border: bool) -> GridMap:
+    """Return a map with its obstacles grown by a radius, and what is outside of it if asked for."""
+    if not with_border:
+        return grid.inflated(radius)
+    return GridMap(GridMap(np.pad(grid.free, 1)).inflated(radius).free[1:-1, 1:-1])
 
 
 def measure(
@@ -207,8 +221,10 @@ def measure(
     optimum = float(from_start[:, task.goal[1], task.goal[0]].min())
     true = (from_start + from_goal).min(axis=0) <= (1 + EPSILON) * optimum + SLACK
     reached = np.isfinite(from_start).any(axis=0)
+    painted = regions(predictor, task, robot, reached)
     result = {}
-    for name, region in regions(predictor, task, robot, reached).items():
+    for name, own in painted.items():
+        region = painted[SHIPPED] if own is None else own
         both = (region & true).sum()
         inside = region.copy()
         inside[task.start[::-1]] = inside[task.goal[::-1]] = True
@@ -219,31 +235,36 @@ def measure(
             "precision": float(both / max(1, region.sum())),
             "held": float(isfinite(ratio)),
             "within": float(ratio <= 1 + EPSILON),
+            "used": float(own is not None),
             "ratio": ratio,
         }
     return result
 
 
-def regions(predictor: Predictor, task: Task, robot: Robot, reached: Cells) -> dict[str, Cells]:
-    """Return the region of each heat map, on the map of positions."""
+def regions(
+    predictor: Predictor, task: Task, robot: Robot, reached: Cells
+) -> dict[str, Cells | None]:
+    """Return the region of each heat map, on the map of positions; None where it is the shipped."""
     grid = task.grid
     start, goal = (np.array(pixel) + 0.5 for pixel in (task.start, task.goal))
     positions = position_map(grid, robot)
+    narrow, wide = robot.inscribed_radius, robot.circumscribed_radius
 
     def painted(seen: GridMap) -> Cells:
         return predictor.predict(seen, start, goal).region & positions.free
 
-    shipped = predictor.predict(grid, start, goal, robot=robot).region
-
-    def inflated(radius: float) -> Cells:
+    def inflated(radius: float, with_border: bool = False) -> Cells | None:
         try:
-            return painted(grid.inflated(radius))
+            return painted(inflate(grid, radius, with_border))
         except (MapError, TaskError):  # start and goal are not connected any more
-            return shipped
+            return None
 
-    narrow, wide = robot.inscribed_radius, robot.circumscribed_radius
+    bordered = inflated(narrow, with_border=True)
+    if bordered is None:  # as position_map does, which gives the diagonal of a pixel back
+        bordered = inflated(max(0.0, narrow - 2**0.5), with_border=True)
     return {
-        SHIPPED: shipped,
+        SHIPPED: predictor.predict(grid, start, goal, robot=robot).region,
+        "border blocked": bordered,
         "map of positions": painted(positions),
         "midway radius": inflated((narrow + wide) / 2),
         "circumscribed radius": inflated(wide),

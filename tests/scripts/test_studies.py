@@ -169,6 +169,25 @@ def test_generated_maps(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_footprints(tmp_path: Path) -> None:
+    pytest.importorskip("torch")
+    report = tmp_path / "footprints.json"
+    run_script(STUDIES / "footprints.py", "--tasks", "1", "--json", str(report))
+    result = json.loads(report.read_text())
+    rows = {(row["tasks"], row["rectangle"], row["heatmap"]): row for row in result["rows"]}
+    assert len(rows) == 2 * 3 * 8
+    for group in ("random", "gaps"):
+        for rectangle in ("1:1", "2:1", "4:1"):
+            everything = rows[group, rectangle, "all positions"]
+            assert everything["recall"] == everything["within"] == [1, 1, 1]
+            assert everything["ratio"][0] == pytest.approx(1)
+            assert rows[group, rectangle, "as shipped"]["difference"]["iou"] == [0, 0, 0]
+    # The slender rectangle does not get through where the tasks with gaps lead a disc.
+    assert rows["gaps", "4:1", "corridor"]["within"] == [0, 0, 0]
+    assert rows["gaps", "4:1", "reached positions"]["iou"][0] > 0.5
+
+
+@pytest.mark.slow
 def test_overlap(tmp_path: Path) -> None:
     pytest.importorskip("torch")
     rows, report = tmp_path / "rows.jsonl", tmp_path / "overlap.json"
