@@ -175,16 +175,16 @@ def test_footprints(tmp_path: Path) -> None:
     run_script(STUDIES / "footprints.py", "--tasks", "1", "--json", str(report))
     result = json.loads(report.read_text())
     rows = {(row["tasks"], row["rectangle"], row["heatmap"]): row for row in result["rows"]}
-    assert len(rows) == 2 * 3 * 8
-    for group in ("random", "gaps"):
+    assert len(rows) == 3 * 3 * 9
+    for group in ("random", "gaps", "border"):
         for rectangle in ("1:1", "2:1", "4:1"):
             everything = rows[group, rectangle, "all positions"]
             assert everything["recall"] == everything["within"] == [1, 1, 1]
             assert everything["ratio"][0] == pytest.approx(1)
             assert rows[group, rectangle, "as shipped"]["difference"]["iou"] == [0, 0, 0]
-    # The slender rectangle does not get through where the tasks with gaps lead a disc.
-    assert rows["gaps", "4:1", "corridor"]["within"] == [0, 0, 0]
-    assert rows["gaps", "4:1", "reached positions"]["iou"][0] > 0.5
+        # The slender rectangle does not get through where a disc of its width does.
+        assert rows[group, "4:1", "corridor"]["within"][0] == (group == "random")
+    assert rows["border", "4:1", "border blocked"]["within"] == [1, 1, 1]
 
 
 @pytest.mark.slow
