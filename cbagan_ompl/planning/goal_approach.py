@@ -1,61 +1,83 @@
-"""Poses from which a robot with a turning radius can reach its goal in one curve."""
+"""Poses from which a robot with a heading reaches its goal in one motion."""
 
 from __future__ import annotations
 
-from math import pi
+from collections.abc import Callable
+from math import cos, pi, sin
 from typing import Any
 
 from ..robots.arcs import follow_arc
+from ..sampling.headings import FOLLOWING
 from ..sampling.sampler import HeatmapSampler
-from .compat import new_state, ob, typed_state
-from .states import drives_backwards, pose_space, state_access
+from .compat import new_state, typed_state
+from .planner_kinds import plans_controls
+from .problem import range_of
+from .states import drives_backwards, has_turning_radius, pose_space, state_access
 
 # Lengths of the shortest curves that turn a robot by pi in place, in turning radii.
 _DUBINS_TURN, _REEDS_SHEPP_TURN = 7 * pi / 3, pi
 
-# Curves of random length and curvature before the goal itself is taken.
+# Motions of random length and direction that are tried before the goal itself is taken.
 _MOST_TRIES = 10
+
+# How near to the goal a tree is for its samples to be poses before it, in ranges.
+_NEAR = 2.0
+
+Pose = tuple[float, float, float]
+#: Moves a pose back along a motion that ends in it, at random.
+StepBack = Callable[[Pose], Pose]
 
 
 class GoalApproach:
-    """Move goal poses back along curves that end in them.
+    """Move goal poses back along motions that end in them.
 
-    A tree of a planner that cannot turn on the spot enters a goal in a narrow place only from
-    nodes whose heading fits. So some of its samples are poses before the goal: on an arc of
-    circle, no narrower than the robot can turn, up to half such a circle long. Robots that drive
-    backwards may come from ahead of the goal as well.
+    A tree enters a goal in a narrow place only from nodes whose heading fits. Where the node that
+    is nearest to the goal has another one, the planner tries the same motion to the goal again and
+    again. So once the tree is near, some of its samples are poses before the goal.
 
     Args:
-        space: an OMPL state space of poses with a turning radius.
+        space: an OMPL state space of poses.
         sampler: of the planner. Poses whose position is blocked on its map are not proposed.
+        step_back: proposes the poses.
+        near: distance to the goal from which on a node is near it.
     """
 
-    def __init__(self, space: Any, sampler: HeatmapSampler) -> None:
+    def __init__(
+        self, space: Any, sampler: HeatmapSampler, step_back: StepBack, near: float
+    ) -> None:
+        self._space, self._step_back, self._near = space, step_back, near
         self._states = state_access(space)
-        self._reverses = drives_backwards(space)
-        self._radius = turning_radius(space)
         self._grid, self._chance = sampler.heatmap.grid, sampler.chance
         self._fraction = sampler.spread.approach_fraction
+        self._is_near = False
+
+    def on_new_node(self, distance: float, count: int) -> None:
+        """Note that the planner's tree has a new node.
+
+        Args:
+            distance: of the node from the goal.
+            count: how many nodes the tree has with it: 1 where it has begun anew.
+        """
+        self._is_near = distance <= self._near or (self._is_near and count != 1)
 
     def is_due(self) -> bool:
         """Return whether the next sample is one before the goal, at random."""
-        return self._chance() < self._fraction
+        return self._is_near and self._chance() < self._fraction
 
     def move_back(self, state: Any) -> None:
-        """Move a goal state back, at random; it stays where it is if the way there is blocked.
+        """Move a goal state back, at random; it stays where it is if there is no room.
 
         Args:
             state: of the space, changed in place.
         """
-        x, y, yaw = self._states.read_pose(state)
+        goal = self._states.read_pose(state)
         for _ in range(_MOST_TRIES):
-            turn = pi * self._radius * self._chance()
-            if not (self._reverses and self._chance() < 0.5):
-                turn = -turn
-            moved = follow_arc(x, y, yaw, turn, (2 * self._chance() - 1) / self._radius)
-            if self._grid.is_free(moved[:2]):
-                self._states.write_pose(state, *moved)
-                return
+            pose = self._step_back(goal)
+            if self._grid.is_free(pose[:2]):
+                self._states.write_pose(state, *pose)
+                if self._space.satisfiesBounds(state):
+                    return
+        self._states.write_pose(state, *goal)
 
 
 def turning_radius(space: Any) -> float:
@@ -67,6 +89,7 @@ def turning_radius(space: Any) -> float:
         space: a DubinsStateSpace or ReedsSheppStateSpace, or one that holds one as its first part.
 
     Example:
+        >>> from ompl import base as ob
         >>> round(turning_radius(ob.DubinsStateSpace(5.0)), 6)
         5.0
     """
@@ -81,14 +104,51 @@ def turning_radius(space: Any) -> float:
     return float(poses.distance(*states)) / turn
 
 
-def goal_approach(space: Any, sampler: HeatmapSampler) -> GoalApproach | None:
-    """Return the approach of goals; None where a robot can turn on the spot or it is switched off.
+def goal_approach(planner: Any, sampler: HeatmapSampler) -> GoalApproach | None:
+    """Return the approach of goals for a planner.
 
     Args:
-        space: an OMPL state space.
+        planner: an OMPL planner.
         sampler: of the planner.
+
+    Returns:
+        None where states are no poses, where the planner plans controls, and where the approach is
+        switched off, by itself or with all headings.
     """
-    spread = sampler.spread
-    has_radius = isinstance(pose_space(space), ob.DubinsStateSpace | ob.ReedsSheppStateSpace)
+    space, spread = planner.getSpaceInformation().getStateSpace(), sampler.spread
+    longest = range_of(planner)
     is_on = spread.approach_fraction > 0 and spread.uniform_fraction < 1
-    return GoalApproach(space, sampler) if has_radius and is_on else None
+    if not is_on or pose_space(space) is None or plans_controls(planner):
+        return None
+    if has_turning_radius(space):
+        step_back = _arc_back(turning_radius(space), drives_backwards(space), sampler.chance)
+    else:
+        step_back = _line_back(longest, sampler.chance)
+    return GoalApproach(space, sampler, step_back, _NEAR * longest)
+
+
+def _arc_back(radius: float, reverses: bool, chance: Callable[[], float]) -> StepBack:
+    """Return what moves a pose back along an arc of circle, up to half such a circle long.
+
+    Robots that drive backwards may come from ahead of the pose as well.
+    """
+
+    def step_back(pose: Pose) -> Pose:
+        length = pi * radius * chance()
+        if not (reverses and chance() < 0.5):
+            length = -length
+        return follow_arc(*pose, length, (2 * chance() - 1) / radius)
+
+    return step_back
+
+
+def _line_back(longest: float, chance: Callable[[], float]) -> StepBack:
+    """Return what moves a pose along a line in any direction, and turns it a little."""
+
+    def step_back(pose: Pose) -> Pose:
+        x, y, yaw = pose
+        length, angle = longest * chance(), 2 * pi * chance()
+        turned = yaw + FOLLOWING * (2 * chance() - 1)
+        return x + length * cos(angle), y + length * sin(angle), (turned + pi) % (2 * pi) - pi
+
+    return step_back

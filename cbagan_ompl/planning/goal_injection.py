@@ -80,6 +80,8 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
             count = self._sampler.on_new_node(x, y, in_goal, follows)
             if count and self._extension is not None:
                 self._extension.add(state, count)
+            if self._approach is not None:
+                self._approach.on_new_node(distance, count)
             if in_goal:
                 monitor.note_reached()
         return distance
@@ -144,7 +146,7 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
 
     def _take(self, sampler: HeatmapSampler) -> None:
         self._sampler = sampler
-        self._approach = goal_approach(self.getSpaceInformation().getStateSpace(), sampler)
+        self._approach = goal_approach(self._monitor.setup.getPlanner(), sampler)
         self._extension = pose_extension(self._monitor.setup.getPlanner(), sampler)
 
     def _follow(self, sampler: HeatmapSampler, states: StateAccess) -> None:

@@ -1,4 +1,4 @@
-"""Poses that a planner's tree reaches in one step, for robots that drive forwards alone."""
+"""Poses that a planner's tree reaches in one step, for robots with a heading."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .compat import new_state, ob, typed_state
 from .goal_approach import turning_radius
 from .planner_kinds import plans_controls
 from .problem import range_of
-from .states import state_access
+from .states import drives_backwards, has_turning_radius, state_access
 
 if TYPE_CHECKING:
     from ..sampling.tree_extension import TreeExtension
@@ -59,7 +59,7 @@ class PoseExtension:
             node, pose = found
             self._states.write_pose(self._node, *node)
             self._states.write_pose(state, *pose)
-            if self._si.checkMotion(self._node, state):
+            if self._si.satisfiesBounds(state) and self._si.checkMotion(self._node, state):
                 return True
         return False
 
@@ -72,18 +72,29 @@ def pose_extension(planner: Any, sampler: HeatmapSampler) -> PoseExtension | Non
         sampler: of the planner.
 
     Returns:
-        None where states are not those of Dubins curves, where the planner plans controls, and
-        where all headings are uniform or the tree is not watched.
+        None where states are no poses, or have other parts as well, where motions go backwards,
+        where the planner plans controls, and where all headings are uniform or the tree is not
+        watched.
     """
     si, spread = planner.getSpaceInformation(), sampler.spread
     space = si.getStateSpace()
-    if not isinstance(space, ob.DubinsStateSpace):
+    if not isinstance(space, ob.SE2StateSpace) or drives_backwards(space):
         return None
     if plans_controls(planner) or sampler.covered is None or spread.uniform_fraction == 1:
         return None
-    from ..sampling.tree_extension import TreeExtension  # compiled
+    extension = _make_extension(space, sampler, range_of(planner))
+    return None if extension is None else PoseExtension(si, sampler, extension)
 
-    extension = TreeExtension(
-        sampler.heatmap, turning_radius(space), range_of(planner), sampler.rng
-    )
-    return PoseExtension(si, sampler, extension)
+
+def _make_extension(space: Any, sampler: HeatmapSampler, longest: float) -> TreeExtension | None:
+    """Return what proposes the poses of a space; None where positions have no weight in it."""
+    if has_turning_radius(space):
+        from ..sampling.arc_extension import ArcExtension  # compiled, as the other one
+
+        return ArcExtension(sampler.heatmap, turning_radius(space), longest, sampler.rng)
+    from ..sampling.line_extension import LineExtension
+
+    weights = space.getSubspaceWeight(0), space.getSubspaceWeight(1)
+    if weights[0] <= 0:
+        return None
+    return LineExtension(sampler.heatmap, weights, sampler.spread.spread, longest, sampler.rng)

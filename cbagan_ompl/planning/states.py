@@ -234,11 +234,18 @@ def is_distance_bound(space: Any) -> bool:
     """
     part = position_space(space)
     weight = 1.0 if part is space else space.getSubspaceWeight(0)
-    if isinstance(part, ob.SE2StateSpace) and not isinstance(
-        part, ob.DubinsStateSpace | ob.ReedsSheppStateSpace
-    ):
+    if isinstance(part, ob.SE2StateSpace) and not has_turning_radius(part):
         weight *= part.getSubspaceWeight(0)
     return bool(weight >= 1)
+
+
+def has_turning_radius(space: Any) -> bool:
+    """Return whether motions in a space are curves of a robot that cannot turn on the spot.
+
+    Args:
+        space: an OMPL state space.
+    """
+    return isinstance(pose_space(space), ob.DubinsStateSpace | ob.ReedsSheppStateSpace)
 
 
 def drives_backwards(space: Any) -> bool:

@@ -13,7 +13,7 @@ from ..maps.grid_map import GridMap
 from ..robots.robot import Robot
 from ..robots.shape_checker import ShapeChecker
 from .compat import ob
-from .states import StateAccess, space_of, state_access
+from .states import StateAccess, has_turning_radius, space_of, state_access
 
 _LAST_VALID_PRECISION = 1e-3
 
@@ -160,7 +160,7 @@ def set_last_valid(
 
 
 def _straight_state_access(space: Any) -> StateAccess:
-    if isinstance(space, ob.DubinsStateSpace | ob.ReedsSheppStateSpace):
+    if has_turning_radius(space):
         raise PlannerError(
             f"GridMotionValidator checks straight motions, those of {type(space).__name__} are "
             "curves: keep OMPL's own motion validator, with a GridValidityChecker and "

@@ -100,9 +100,10 @@ class HeadingSpread:
             probabilistically complete; with 1 the headings of the heat map are not used at all.
         reverse_fraction: fraction of the other samples whose heading is turned by pi, from 0 to 1,
             for robots that drive backwards as well (ReedsSheppStateSpace).
-        approach_fraction: fraction of a planner's samples before its first path, from 0 to 1, that
-            are poses from which the goal is reached along one arc, for robots with a turning
-            radius, where goal injection reaches the planner. None if all headings are uniform.
+        approach_fraction: fraction of a planner's samples, from 0 to 1, once its tree is within
+            its range of the goal and before its first path, that are poses from which the goal is
+            reached in one motion, where goal injection reaches the planner. None if all headings
+            are uniform.
 
     Raises:
         ConfigError: a value of the wrong type or out of range; the message names the option.
@@ -115,7 +116,7 @@ class HeadingSpread:
     spread: float = 0.4
     uniform_fraction: float = 0.2
     reverse_fraction: float = 0.2
-    approach_fraction: float = 0.1
+    approach_fraction: float = 0.25
 
     def __post_init__(self) -> None:
         given = [getattr(self, field.name) for field in fields(self)]
