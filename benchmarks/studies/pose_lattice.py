@@ -12,14 +12,15 @@ https://doi.org/10.1073/pnas.93.4.1591), and by Dijkstra's steps between heading
 in the labels of the network, so lengths are those of paths at any angle, not of steps on the grid.
 
 What it leaves out makes it conservative: centres of pixels only, 32 headings, no move while
-turning. Past the corner of an obstacle a path may be too near by less than a pixel.
+turning; `refined_cost` says how much that matters. Past the corner of an obstacle a path may be too
+near by less than a pixel.
 """
 
 from __future__ import annotations
 
 from functools import lru_cache
 from heapq import heapify, heappop, heappush
-from math import ceil, pi
+from math import ceil, inf, pi
 from typing import NamedTuple
 
 import cv2
@@ -49,10 +50,12 @@ class PoseLattice(NamedTuple):
     Attributes:
         free: (headings, H, W), whether a pose is free.
         turns: (headings, H, W), whether it can turn from there to the next heading.
+        turn_cost: of such a turn, in pixels.
     """
 
     free: Cells
     turns: Cells
+    turn_cost: float = TURN_COST
 
     @property
     def positions(self) -> Cells:
@@ -83,7 +86,7 @@ class PoseLattice(NamedTuple):
         around = ((0, 0), (1, 1), (1, 1))
         padded = np.pad(costs, around, constant_values=np.inf)
         end = (-1, -1) if target is None else (target[0] + 1, target[1] + 1)
-        _march(np.pad(free, around), np.pad(self.turns, around), padded, *end, TURN_COST)
+        _march(np.pad(free, around), np.pad(self.turns, around), padded, *end, self.turn_cost)
         return padded[:, 1:-1, 1:-1]
 
     def cost_between(
@@ -114,6 +117,29 @@ def make_lattice(grid: GridMap, robot: Robot) -> PoseLattice:
         for masks in touched_masks(robot)
     )
     return PoseLattice(free, turns)
+
+
+def refined_cost(
+    grid: GridMap, robot: Robot, source: tuple[int, int], target: tuple[int, int]
+) -> float:
+    """Return the cost of the shortest path between two pixels on a lattice of half pixels.
+
+    Rectangles get through more gaps on it. It begins in the middle of quarters of the pixels.
+    """
+    free = np.kron(grid.free, np.ones((2, 2), bool))
+    large = Robot.polygon([(2 * x, 2 * y) for x, y in robot.corners])
+    lattice = make_lattice(GridMap(free), large)._replace(turn_cost=2 * TURN_COST)
+    ends = [
+        (2 * column + right, 2 * row + down)
+        for column, row in (source, target)
+        for right in (0, 1)
+        for down in (0, 1)
+    ]
+    fits = [end for end in ends if lattice.positions[end[::-1]]]
+    starts, goals = ([end for end in fits if end in some] for some in (ends[:4], ends[4:]))
+    if not (starts and goals):
+        return inf
+    return lattice.cost_between(starts[0], goals[0]) / 2
 
 
 @lru_cache(maxsize=8)

@@ -105,3 +105,12 @@ def test_paths_keep_to_a_region_and_pay_for_turns(lattices: Any) -> None:
     lattice.free[1:, 40, 20] = False
     costs = lattice.costs_from(start)[:, 40, 30]
     assert costs[8] - costs[0] == pytest.approx(8 * lattices.TURN_COST, abs=1e-4)
+
+
+def test_finer_lattice_gets_through_where_centres_of_pixels_do_not(lattices: Any) -> None:
+    start, goal, robot = (20, 10), (120, 50), Robot.rectangle(14, 3.4)
+    # The middle of four pixels is between two of them.
+    assert lattices.make_lattice(corridor(4), robot).cost_between(start, goal) == np.inf
+    wide = lattices.make_lattice(corridor(5), robot).cost_between(start, goal)
+    assert lattices.refined_cost(corridor(4), robot, start, goal) == pytest.approx(wide, rel=0.02)
+    assert lattices.refined_cost(corridor(3), robot, start, goal) == np.inf

@@ -172,7 +172,7 @@ def test_generated_maps(tmp_path: Path) -> None:
 def test_footprints(tmp_path: Path) -> None:
     pytest.importorskip("torch")
     report = tmp_path / "footprints.json"
-    run_script(STUDIES / "footprints.py", "--tasks", "1", "--json", str(report))
+    run_script(STUDIES / "footprints.py", "--tasks", "1", "--gaps", "1", "--json", str(report))
     result = json.loads(report.read_text())
     rows = {(row["tasks"], row["rectangle"], row["heatmap"]): row for row in result["rows"]}
     assert len(rows) == 3 * 3 * 9
