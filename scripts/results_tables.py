@@ -17,7 +17,7 @@ from pathlib import Path
 from calibrate import calibration_table, files_table
 from inference_speed import speed_table as speed_of_models
 from planner_tables import Json, ratios_table
-from robot_tables import car_suites, robot_paths
+from robot_tables import car_suites, robot_costs, robot_paths, wrong_poses
 from search_speed import speed_table
 from study_tables import control, footprints, overlap, paper_networks, spread
 from suite_tables import (
@@ -350,6 +350,8 @@ TABLES: dict[str, Callable[[], str]] = {
     "calibration_real_maps": lambda: files_table(read("calibration.json")),
     "inference_speed": lambda: speed_of_models(read("inference_speed.json")),
     "robot_paths": robot_paths,
+    "robot_costs": robot_costs,
+    "wrong_poses": wrong_poses,
     "car_suites": car_suites,
     "footprints": footprints,
     "control": control,

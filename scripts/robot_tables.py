@@ -16,18 +16,54 @@ def robot_paths() -> str:
 
 def path_cells(row: Json) -> list[str]:
     solved, low, high = row["solved"]
-    quartiles = " / ".join("-" if q is None else f"{q:.0f}" for q in row["first_ms"])
-    ratio, least, most = row["sooner"]
-    ratios = "-" if ratio is None else f"{ratio:.1f} ({least:.1f} to {most:.1f})"
     return [
         row["space"],
         row["planner"],
         row["sampler"],
         str(row["runs"]),
         f"{solved:.0%} ({low:.0%} to {high:.0%})",
-        quartiles,
-        ratios,
+        quartile_cell(row["first_ms"]),
+        ratio_cell(row["sooner"]),
     ]
+
+
+def robot_costs() -> str:
+    """Return the times of RRT* until it is near the best known path."""
+    result = read("robot_paths_ompl_2.0.1.json")
+    rows = [
+        [
+            row["space"],
+            row["sampler"],
+            str(row["tasks"] * result["full_seeds"]),
+            quartile_cell(row["within_ms"]),
+            ratio_cell(row["within_sooner"]),
+        ]
+        for row in result["rows"]
+        if "within_ms" in row
+    ]
+    header = ["space", "sampler", "runs", "within 10 %, quartiles (ms)", "ratio of medians"]
+    return table(header, rows)
+
+
+def wrong_poses() -> str:
+    """Return what wrong heat maps cost robots with heading."""
+    by_heatmap: dict[str, dict[str, str]] = {}
+    for row in read("wrong_poses_ompl_2.0.1.json")["rows"]:
+        ratio, low, high = row["ratio"]
+        cell = f"{ratio:.2f} ({low:.2f} to {high:.2f}), {row['solved']:.0%}"
+        by_heatmap.setdefault(row["heatmap"], {})[f"{row['space']} {row['planner']}"] = cell
+    columns = list(next(iter(by_heatmap.values())))
+    rows = [[name, *(cells[column] for column in columns)] for name, cells in by_heatmap.items()]
+    return table(["heat map", *columns], rows)
+
+
+def quartile_cell(values: list[float | None]) -> str:
+    return " / ".join("-" if value is None else f"{value:.0f}" for value in values)
+
+
+def ratio_cell(values: list[float | None]) -> str:
+    ratio, least, most = values
+    return "-" if ratio is None else f"{ratio:.1f} ({least:.1f} to {most:.1f})"
 
 
 def car_suites() -> str:

@@ -45,13 +45,13 @@ OWN, DEFAULT, ALONG, INFLATED = "OMPL's own", "default", "along the path", "infl
 CURVES = {
     "spread": (0.1, 0.2, 0.8, 1.6),
     "uniform_fraction": (0.05, 0.4, 0.7, 1.0),
-    "approach_fraction": (0.0, 0.05, 0.2, 0.4),
+    "approach_fraction": (0.0, 0.1, 0.5, 0.8),
     "reverse_fraction": (0.0, 0.1, 0.35, 0.5),
 }
 INFLATIONS = (1.6, 4.5, 6.0)
-# A robot that turns on the spot needs no approach, and only one space has reversals.
+# Only one space has reversals.
 UNUSED = {
-    "SE2": {"approach_fraction", "reverse_fraction"},
+    "SE2": {"reverse_fraction"},
     "Dubins 10": {"reverse_fraction"},
     "Reeds-Shepp 10": set[str](),
 }

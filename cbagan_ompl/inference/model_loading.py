@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..common.validation import require_torch
-from .convolutions import use_onednn
+from .convolutions import convolve_maps_once, use_onednn
 from .model_files import ModelFile, ModelFormat, load_graphs, load_script
 from .onnx_graphs import OnnxGraphs, require_onnx_runtime
 from .probe import Kind, try_model
@@ -55,4 +55,5 @@ def load_functions(model: ModelFile) -> torch.nn.Module | OnnxGraphs:
         return load_graphs(model.content)
     module = load_script(model.content)
     use_onednn(module)
+    convolve_maps_once(module)
     return module

@@ -187,7 +187,7 @@ def _locate(
 ) -> tuple[NDArray[np.float64], tuple[int, int]]:
     """Return a position as :func:`check_position`, and the row and column of its pixel."""
     position = check_point(role, point)
-    column, row = map(floor, grid.to_pixel(position).tolist())
+    column, row = map(floor, grid.pixel_from_world.at(*position.tolist()))
     if not (0 <= column < grid.width and 0 <= row < grid.height):
         low, high = grid.bounds
         raise TaskError(

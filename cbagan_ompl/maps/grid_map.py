@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..common.validation import finite_number, is_finite_number
+from ..common.validation import finite_number, is_finite_number, truth_value
 from ..errors import MapError, show
 from .clearance import Clearance, map_clearance
 from .collision import pixels_are_free, segment_is_free
@@ -75,7 +75,7 @@ class GridMap:
         check_frame(self.resolution, self.origin, self.shape, name)
         #: Name and free pixels before obstacles were inflated, for messages.
         self.bare = name, self.free
-        self._inflated: dict[float, GridMap] = {}
+        self._inflated: dict[tuple[float, bool], GridMap] = {}
 
     @classmethod
     def load(cls, path: str | PathLike[str], *, name: str | None = None, **options: Any) -> GridMap:
@@ -262,35 +262,39 @@ class GridMap:
             for start, end in zip(pixels[:-1].tolist(), pixels[1:].tolist(), strict=True)
         )
 
-    def inflated(self, radius: float) -> GridMap:
+    def inflated(self, radius: float, border: bool = False) -> GridMap:
         """Return the map for the centre of a disc-shaped robot: obstacles grown by its radius.
 
         Every point of a pixel that stays free is at least ``radius`` away from every point of
         every blocked pixel (square to square), and every pixel for which that holds stays free.
         So the robot cannot touch an obstacle wherever in the pixel its centre is. The cost is that
-        up to a pixel's diagonal of room is given away. The border of the map is no obstacle.
+        up to a pixel's diagonal of room is given away.
 
         Args:
             radius: in world units; 0 returns the map itself, any more blocks the pixels that
                 touch an obstacle.
+            border: whether what is beyond the border of the map is an obstacle as well.
 
         Raises:
             MapError: radius negative or not finite, or nothing stays free.
+            ConfigError: ``border`` is no truth value.
         """
+        truth_value("border", border)
         if not is_finite_number(radius) or radius < 0:
             raise MapError(f"the robot radius must be a length of at least 0, got {show(radius)}")
         radius = float(radius)
-        if radius == 0 or self.free.all():
+        if radius == 0 or (self.free.all() and not border):
             return self
-        if radius not in self._inflated:
-            free = erode(self.free, radius, self.resolution, self.name)
+        key = radius, border
+        if key not in self._inflated:
+            free = erode(self.free, radius, self.resolution, self.name, border)
             name = f"{self.name} (inflated by {radius:g})"
             grown = GridMap(free, self.resolution, self.origin, name=name, unknown=self.unknown)
             grown.bare = self.bare
             if len(self._inflated) == _KEPT_RADII:
                 del self._inflated[next(iter(self._inflated))]
-            self._inflated[radius] = grown
-        return self._inflated[radius]
+            self._inflated[key] = grown
+        return self._inflated[key]
 
     @cached_property
     def clearance(self) -> Clearance:

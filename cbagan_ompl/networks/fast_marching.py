@@ -27,6 +27,10 @@ _BUCKETS, _BUCKET_WIDTH = 128, 0.25
 _TOLERANCE = np.float32(1e-5)
 
 
+# Of indices that are not negative: of all others numba asks each time whether they are.
+_Index = np.uintp
+
+
 def march_all(
     costs: NDArray[np.float32],
     linked: NDArray[np.uint16],
@@ -165,11 +169,11 @@ def _least(
     """
     bits &= 15
     if bits == 1:  # nearly always
-        return np.float32(values[cell])
+        return np.float32(values[_Index(cell)])
     best = UNREACHED
     for part in range(4):
         if (bits >> part) & 1:
-            best = min(best, values[part * cells + cell])
+            best = min(best, values[_Index(part * cells + cell)])
     return best
 
 
@@ -182,91 +186,95 @@ def _march(
     values: NDArray[np.float32],
     width: int,
 ) -> None:  # pragma: no cover
-    """Find the distances from a node, in place."""
-    # Each bucket is a list of entries: rows 0 and 1 are the node and the entry behind. A node whose
-    # distance falls gets another entry; its bucket says which one counts. This touches less memory
-    # than lists from which nodes can be taken.
+    """Find the distances from a node, in place.
+
+    All in one function, since numba counts references to arrays at each call of another.
+
+    Args:
+        costs: of all nodes.
+        linked: the same.
+        source: the node.
+        target: the node that counts for how far distances are found.
+        values: of all nodes, :data:`UNREACHED`.
+        width: columns of patches.
+    """
+    # Each bucket is a list of entries, each a node and the entry behind. A node whose distance
+    # falls gets another entry; its bucket says which one counts. This touches less memory than
+    # lists from which nodes can be taken.
     heads = np.full(_BUCKETS, -1, np.int32)
-    entries = np.empty((2, 4 * len(costs)), np.int32)
+    entries = np.empty((4 * len(costs), 2), np.int32)
     bucket_of = np.full(len(costs), -1, np.int32)
-    pool = np.array((-1, 1, 1), np.int32)  # first unused entry, entries ever used, entries in use
+    steps, cells = (-1, 1, -width, width), len(costs) // 4
     values[source], bucket_of[source] = 0, 0
-    heads[0], entries[0, 0], entries[1, 0] = 0, source, -1
+    heads[0], entries[0, 0], entries[0, 1] = 0, source, -1
+    unused, ever_used, in_use = -1, 1, 1  # the first unused entry, and numbers of entries
     number, limit = 0, np.float32(1e30)
-    while pool[2] > 0 and number * _BUCKET_WIDTH <= limit:
-        if heads[number & (_BUCKETS - 1)] < 0:
+    while in_use > 0 and number * _BUCKET_WIDTH <= limit:
+        slot = _Index(number & (_BUCKETS - 1))
+        entry = heads[slot]
+        if entry < 0:
+            if values[target] <= number * _BUCKET_WIDTH:
+                limit = np.float32(REACH * values[target] + REACH_SLACK)
             number += 1
             continue
-        _empty_bucket(costs, linked, values, width, heads, entries, bucket_of, pool, number)
-        if values[target] <= number * _BUCKET_WIDTH:
-            limit = np.float32(REACH * values[target] + REACH_SLACK)
+        node, heads[slot] = entries[_Index(entry), 0], entries[_Index(entry), 1]
+        entries[_Index(entry), 1], unused, in_use = unused, entry, in_use - 1
+        if bucket_of[_Index(node)] != number:
+            continue
+        bucket_of[_Index(node)] = -1
+        links, patch = int(linked[_Index(node)]), node if node < cells else node % cells
+        for direction in range(4):
+            beside, nodes = patch + steps[direction], (links >> (4 * direction)) & 15
+            other = beside - cells
+            while nodes:
+                is_linked, other, nodes = nodes & 1, other + cells, nodes >> 1
+                if not is_linked or values[_Index(other)] <= values[_Index(node)]:
+                    continue
+                side = _least_beside(values, linked[_Index(other)], cells, beside, width, direction)
+                new = _distance(values[_Index(node)], side, costs[_Index(other)])
+                if new >= values[_Index(other)] - _TOLERANCE:
+                    continue
+                values[_Index(other)] = new
+                bucket = max(number, int(new * np.float32(1 / _BUCKET_WIDTH)))
+                before = bucket_of[_Index(other)]
+                # With many entries in use it waits where it is: it is visited later, but it is.
+                waits = before >= 0 and in_use > 2 * len(costs)
+                if before != bucket and not waits:
+                    bucket_of[_Index(other)], slot = bucket, _Index(bucket & (_BUCKETS - 1))
+                    entry, unused, ever_used = _take_entry(entries, unused, ever_used)
+                    entries[_Index(entry), 0], entries[_Index(entry), 1] = other, heads[slot]
+                    heads[slot], in_use = entry, in_use + 1
+    _forget_far(values, limit)
+
+
+@compiled
+def _take_entry(
+    entries: NDArray[np.int32], unused: int, ever_used: int
+) -> tuple[int, int, int]:  # pragma: no cover
+    """Return an entry, and what the first unused one and the number of those ever used become."""
+    if unused < 0:
+        return ever_used, unused, ever_used + 1
+    return unused, int(entries[_Index(unused), 1]), ever_used
+
+
+@compiled
+def _forget_far(values: NDArray[np.float32], limit: np.float32) -> None:  # pragma: no cover
+    """Take distances above a limit for those of nodes that no path reaches."""
     for node in range(len(values)):
         if values[node] > limit:
             values[node] = UNREACHED
 
 
 @compiled
-def _empty_bucket(
-    costs: NDArray[np.float32],
-    linked: NDArray[np.uint16],
-    values: NDArray[np.float32],
-    width: int,
-    heads: NDArray[np.int32],
-    entries: NDArray[np.int32],
-    bucket_of: NDArray[np.int32],
-    pool: NDArray[np.int32],
-    number: int,
-) -> None:  # pragma: no cover
-    """Visit the nodes of a bucket: lower the distances of the nodes that are linked with them."""
-    cells = len(costs) // 4
-    steps = np.array((-1, 1, -width, width))
-    while heads[number & (_BUCKETS - 1)] >= 0:
-        entry = heads[number & (_BUCKETS - 1)]
-        node = entries[0, entry]
-        heads[number & (_BUCKETS - 1)] = entries[1, entry]
-        entries[1, entry], pool[0] = pool[0], entry
-        pool[2] -= 1
-        if bucket_of[node] != number:
-            continue
-        bucket_of[node] = -1
-        for link in range(16):
-            if not (linked[node] >> link) & 1:
-                continue
-            patch = node % cells + steps[link >> 2]
-            other = (link & 3) * cells + patch
-            if values[other] <= values[node]:
-                continue
-            side = _least_beside(values, linked[other], cells, patch, width, link < 8)
-            new = _distance(values[node], side, costs[other])
-            if new >= values[other] - _TOLERANCE:
-                continue
-            values[other] = new
-            bucket = max(number, int(new * np.float32(1 / _BUCKET_WIDTH)))
-            # With many entries in use it waits where it is: it is visited later, but it is.
-            if bucket_of[other] == bucket or (bucket_of[other] >= 0 and pool[2] > 2 * len(costs)):
-                continue
-            entry = pool[0]
-            if entry >= 0:
-                pool[0] = entries[1, entry]
-            else:
-                entry = pool[1]
-                pool[1] += 1
-            pool[2] += 1
-            entries[0, entry], entries[1, entry] = other, heads[bucket & (_BUCKETS - 1)]
-            heads[bucket & (_BUCKETS - 1)] = entry
-            bucket_of[other] = bucket
-
-
-@compiled
 def _least_beside(
-    values: NDArray[np.float32], bits: int, cells: int, patch: int, width: int, vertical: bool
+    values: NDArray[np.float32], links: int, cells: int, patch: int, width: int, direction: int
 ) -> np.float32:  # pragma: no cover
-    """Return the least distance of the nodes linked along one axis."""
-    if vertical:
-        before, after, bits = patch - width, patch + width, bits >> 8
+    """Return the least distance of the nodes linked along the other axis than a direction's."""
+    if direction < 2:
+        before, after, links = patch - width, patch + width, links >> 8
     else:
         before, after = patch - 1, patch + 1
-    return min(_least(values, bits, cells, before), _least(values, bits >> 4, cells, after))
+    return min(_least(values, links, cells, before), _least(values, links >> 4, cells, after))
 
 
 @compiled

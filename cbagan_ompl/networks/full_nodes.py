@@ -69,11 +69,12 @@ def full_node_of(
     # Of the scaled map: the last row, and column, that begins no later than the pixel.
     v, u = (((pixel[1 - i] + 1) * shape[i] - 1) // free.shape[i] for i in (0, 1))
     row, column = v // 4, u // 4
-    own = codes[:, row, column]
-    if not own[1:].any():
+    own = codes[:, row, column].tolist()
+    if not any(own[1:]):
         node = 0
     elif shape == free.shape:
-        node = int((own >> (4 * (v % 4) + u % 4) & 1).argmax())
+        bits = [code >> (4 * (v % 4) + u % 4) & 1 for code in own]
+        node = bits.index(max(bits))
     else:
         rows, columns = (
             edges[4 * i : 4 * i + 5]

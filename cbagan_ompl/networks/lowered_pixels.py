@@ -39,24 +39,39 @@ def lowered_pixels(
     result = np.zeros((batch, height, width, 16), np.float32)
     worse = np.empty(nodes, np.float32)
     for task in range(batch):
-        through = distances[task, 0] + distances[task, 1] - costs[task]
-        best = through.min()
+        own, cost, one, other = codes[task], costs[task], distances[task, 0], distances[task, 1]
+        best = _least_sum(one, other, cost)
         unit = np.float32(0.05) * (best + np.float32(1.0)) + np.float32(0.25)
         for row in range(height):
             for column in range(width):
-                if not codes[task, 1:, row, column].any():
+                if not (own[1, row, column] | own[2, row, column] | own[3, row, column]):
                     continue
                 most = np.float32(-20.0)
                 for node in range(nodes):
-                    excess = (through[node, row, column] - best) / unit
+                    through = one[node, row, column] + other[node, row, column]
+                    excess = (through - cost[node, row, column] - best) / unit
                     excess = min(max(excess, np.float32(0.02)), np.float32(8.0))
                     worse[node] = -log(exp(_LOG_2 * excess) - 1.0)
                     most = max(most, worse[node])
                 for pixel in range(16):
                     value = np.float32(-20.0)
                     for node in range(nodes):
-                        if (codes[task, node, row, column] >> pixel) & 1:
+                        if (own[node, row, column] >> pixel) & 1:
                             value = max(value, worse[node] - most)
                     if value > -20.0:
                         result[task, row, column, pixel] = value
     return result
+
+
+@compiled
+def _least_sum(
+    one: NDArray[np.float32], other: NDArray[np.float32], costs: NDArray[np.float32]
+) -> np.float32:  # pragma: no cover
+    """Return the least distance through any node, of the distances from start and from goal."""
+    least = np.full(costs.shape[2], np.inf, np.float32)
+    for node in range(costs.shape[0]):
+        for row in range(costs.shape[1]):
+            for column in range(costs.shape[2]):  # side by side
+                through = one[node, row, column] + other[node, row, column]
+                least[column] = min(least[column], through - costs[node, row, column])
+    return np.float32(least.min())

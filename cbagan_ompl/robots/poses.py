@@ -24,8 +24,8 @@ def position_map(grid: GridMap, robot: Robot) -> GridMap:
 
     For robots without heading it is the map inflated by their radius, in which a point moves as the
     robot does. For robots with heading every position stays free that the robot can take with
-    any heading, and some others: the map is inflated by the inscribed radius, less the diagonal of
-    a pixel that inflation gives away.
+    any heading, and some others: the map, with its border, is inflated by the inscribed radius,
+    less the diagonal of a pixel that inflation gives away.
 
     Args:
         grid: the map.
@@ -43,14 +43,16 @@ def position_map(grid: GridMap, robot: Robot) -> GridMap:
     check_robot(robot)
     if not robot.has_heading:
         return grid.inflated(robot.radius)
-    return grid.inflated(max(0.0, robot.inscribed_radius - np.sqrt(2) * grid.resolution))
+    radius = max(0.0, robot.inscribed_radius - np.sqrt(2) * grid.resolution)
+    return grid.inflated(radius, border=True)
 
 
 def passable_map(grid: GridMap, robot: Robot, start: ArrayLike, goal: ArrayLike) -> GridMap:
     """Return the map on which a way for a robot is to be looked for.
 
     On the map of positions a way may lead through gaps that the robot does not fit through. So it
-    is the map inflated by the whole inscribed radius, if that still connects start and goal.
+    is the map, with its border, inflated by the whole inscribed radius, if that still connects
+    start and goal.
 
     Args:
         grid: the map.
@@ -70,7 +72,7 @@ def passable_map(grid: GridMap, robot: Robot, start: ArrayLike, goal: ArrayLike)
     if not robot.has_heading:
         return positions
     try:
-        passable = grid.inflated(robot.inscribed_radius)
+        passable = grid.inflated(robot.inscribed_radius, border=True)
         passable.check_task(start, goal)
     except (MapError, TaskError):
         return positions

@@ -68,7 +68,7 @@ def _raise(heatmap: Heatmap, window: tuple[slice, slice], least: NDArray[np.floa
     """
     support, width = heatmap.support, heatmap.grid.width
     values = np.zeros(heatmap.values.shape, np.float32)
-    values.ravel()[support] = heatmap.values.ravel()[support]
+    values.ravel()[support] = heatmap.support_values
     inside = values[window]
     np.maximum(inside, least * heatmap.grid.free[window], out=inside)
     rows = window[0]
@@ -79,5 +79,6 @@ def _raise(heatmap: Heatmap, window: tuple[slice, slice], least: NDArray[np.floa
     # All that Heatmap() would check is known. The headings are the same.
     raised = copy(heatmap)
     raised.values, raised.support = values, support
+    raised.support_values = values.ravel()[support]
     raised.guarantee, raised._last_connected = None, (None, False)
     return raised

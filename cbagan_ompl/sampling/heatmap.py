@@ -48,6 +48,7 @@ class Heatmap:
             [-pi, pi], NaN where unknown; or None where nothing is known.
         guarantee: what is known of the pixels from a threshold on; None where nothing is.
         support: flat row-major indices of the pixels with a value above 0, ascending, shape (K,).
+        support_values: float32, the values of these pixels, shape (K,).
 
     Args:
         values: any real array of the grid's shape. Unsigned integers are scaled from their full
@@ -98,6 +99,7 @@ class Heatmap:
         self.heading = None if heading is None else check_headings(heading, grid)
         self.guarantee: Guarantee | None = None
         self.support: NDArray[np.intp] = support
+        self.support_values: NDArray[np.float32] = scaled.ravel()[support]
 
     @classmethod
     def load(cls, path: str | PathLike[str], grid: GridMap) -> Heatmap:
@@ -305,7 +307,7 @@ class Heatmap:
         """
         count = whole_number("n", n, 0, _MOST_SAMPLES)
         generator = random_generator(rng)
-        weighted = WeightedPixels(self.support, self.values.ravel()[self.support])
+        weighted = WeightedPixels(self.support, self.support_values)
         pixels = weighted.sample(count, generator)
         return sample_in_pixels(self.grid, pixels, generator)
 

@@ -84,10 +84,9 @@ class HeatmapSampler:
         self._best = inf
         self._has_begun = False
         self._box = np.full(2, -inf), np.full(2, inf)
-        grid, support = heatmap.grid, heatmap.support
-        values = heatmap.values.ravel()[support]
+        grid, values = heatmap.grid, heatmap.support_values
         weights = _power(values / values.max(), self._exponent)
-        self._learned = PixelSampler(grid, support, weights, self.rng)
+        self._learned = PixelSampler(grid, heatmap.support, weights, self.rng)
         self._uniform = PixelSampler(grid, grid.free_pixels, None, self.rng)
 
     @property
@@ -259,7 +258,7 @@ def _power(values: NDArray[np.float32], exponent: np.float32) -> NDArray[np.floa
     """
     if exponent not in range(1, 9):
         return np.asarray(values**exponent)
-    product = values
-    for _ in range(int(exponent) - 1):
-        product = product * values
+    product = values if exponent == 1 else values * values
+    for _ in range(int(exponent) - 2):
+        product *= values
     return product

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cbagan_ompl.errors import MapError, TaskError
+from cbagan_ompl.errors import ConfigError, MapError, TaskError
 from cbagan_ompl.maps.grid_map import GridMap
 from cbagan_ompl.maps.raw_map import MAX_SIDE
 
@@ -157,6 +157,24 @@ def test_inflated_leaves_what_needs_no_change():
     assert grid.inflated(0) is grid
     empty = GridMap(np.ones((4, 4)))
     assert empty.inflated(100) is empty  # the border of the map is no obstacle
+
+
+@pytest.mark.parametrize("radius", [0.5, 1, 2.2, 3])
+def test_inflated_with_its_border_takes_what_is_beyond_it_for_blocked(radius):
+    rng = np.random.default_rng(5)
+    for free in (random_free(rng, 24, 31, blocked=0.02), np.ones((24, 31), bool)):
+        framed = GridMap(np.pad(free, 1)).inflated(radius)
+        grid = GridMap(free)
+        np.testing.assert_array_equal(
+            grid.inflated(radius, border=True).free, framed.free[1:-1, 1:-1]
+        )
+        without = grid.inflated(radius).free
+        assert without.sum() > framed.free.sum(), "and the two are kept apart"
+
+
+def test_inflated_takes_truth_values_for_the_border():
+    with pytest.raises(ConfigError, match="border"):
+        GridMap([[1, 0]]).inflated(1, border="no")  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("radius", [-1, np.nan, np.inf])

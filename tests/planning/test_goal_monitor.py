@@ -175,7 +175,7 @@ for seed in range(1):
     for way in [*ways, {"heatmap": pocket}]:
         for tolerance in (0, 1e-6, None, 60):  # with the last the start is in the goal region
             result = cbagan_ompl.plan(
-                grid, (5.5, 5.5), (50.2, 40.3), "SORRTstar", time=0.1, seed=seed,
+                grid, (5.5, 5.5), (50.2, 40.3), "SORRTstar", time=1.0, seed=seed,
                 goal_tolerance=tolerance, **way
             )
             assert result.solved and result.cost < 1.01 * np.hypot(44.7, 34.8), result

@@ -112,6 +112,9 @@ def test_connected_bridges_a_broken_region(two_walls: GridMap, corridor: Heatmap
     added = connected.region & ~broken.region
     assert 0 < added.sum() < 0.1 * two_walls.free.sum()
     assert connected.connected(START, GOAL) is connected
+    for heatmap in broken, connected:
+        assert np.array_equal(heatmap.support, np.flatnonzero(heatmap.values))
+        assert np.array_equal(heatmap.support_values, heatmap.values[heatmap.values > 0])
 
 
 def test_connected_raises_for_separate_parts() -> None:

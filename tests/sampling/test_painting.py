@@ -29,6 +29,7 @@ def test_painted_values_are_those_of_a_resized_image(shape: tuple[int, int], kin
     assert heatmap is not None
     np.testing.assert_allclose(heatmap.values, expected.values, rtol=0, atol=1e-6)
     assert np.array_equal(heatmap.support, expected.support)
+    assert np.array_equal(heatmap.support_values, heatmap.values.ravel()[heatmap.support])
     assert not heatmap.values.flags.writeable
     assert heatmap.heading is None
     assert np.array_equal(heatmap.sample(50, rng=1), expected.sample(50, rng=1))

@@ -7,6 +7,7 @@ import pytest
 
 from cbagan_ompl import GridMap, Heatmap, Predictor, Robot, RobotError, TaskError, load_model, plan
 from cbagan_ompl.robots.poses import passable_map, position_map
+from cbagan_ompl.robots.shape_checker import ShapeChecker
 from cbagan_ompl.sampling.robot_heatmaps import robot_heatmap
 
 ROBOT = Robot.rectangle(12, 6)
@@ -40,6 +41,30 @@ def test_where_only_the_narrow_gap_connects(two_gaps: GridMap) -> None:
     assert passable_map(grid, ROBOT, START[:2], GOAL[:2]) is position_map(grid, ROBOT)
     heatmap = Heatmap.corridor(grid, START, GOAL, robot=ROBOT)
     assert heatmap.values[20, 63:65].max() >= 0.5
+
+
+def test_the_way_does_not_lead_along_the_border() -> None:
+    free = np.ones((128, 128), bool)
+    free[2:60, 62:66] = False  # between wall and border are two pixels, below there is room
+    grid = GridMap(free)
+    assert position_map(grid, ROBOT).free[64, 1:4].tolist() == [False, True, True]
+    for source in (Heatmap.corridor, load_model().predict):
+        heatmap = source(grid, START, GOAL, robot=ROBOT)
+        assert heatmap.values[:2].max() == 0
+        assert heatmap.values[62:75, 64].max() >= 0.5
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.3, 1.1, np.pi / 2, 2.5])
+def test_every_place_of_the_robot_is_a_position(yaw: float) -> None:
+    """Also next to the border, for a reference point off the middle."""
+    rng = np.random.default_rng(2)
+    robot = Robot.rectangle(9, 5, offset=1.5)
+    grid = GridMap(rng.random((40, 40)) > 0.003)
+    checker, positions = ShapeChecker.of(grid, robot), position_map(grid, robot)
+    points = rng.uniform(0, 40, (3000, 2))
+    fits = [checker.pose_is_free(*point, yaw) for point in points.tolist()]
+    assert 50 < sum(fits) < 2500
+    assert positions.is_free(points[fits]).all()
 
 
 def test_tasks_of_both_kinds_in_one_call(two_gaps: GridMap, predictor: Predictor) -> None:
