@@ -19,7 +19,7 @@ from inference_speed import speed_table as speed_of_models
 from planner_tables import Json, ratios_table
 from robot_tables import car_suites, robot_costs, robot_paths, wrong_poses
 from search_speed import speed_table
-from study_tables import control, overlap, paper_networks, spread
+from study_tables import control, footprints, overlap, paper_networks, spread
 from suite_tables import (
     ROOT,
     VERSIONS,
@@ -353,6 +353,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "robot_costs": robot_costs,
     "wrong_poses": wrong_poses,
     "car_suites": car_suites,
+    "footprints": footprints,
     "control": control,
     "overlap": overlap,
     "search_speed": lambda: speed_table(read("search_speed.json")),

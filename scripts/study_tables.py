@@ -1,4 +1,4 @@
-"""The tables of planning with controls, of overlapped inference and of the paper's networks."""
+"""The tables of controls, of overlapped inference, of the paper's networks and of footprints."""
 
 from __future__ import annotations
 
@@ -74,6 +74,30 @@ def paper_networks() -> str:
         rows.append([name, spread(row["iou"], ".3f"), *means, connected, *nodes, *times])
     header = ["network", "IoU", "Dice", "right pixels", "connected (8)", "RRT nodes, not adapted"]
     return table([*header, "RRT nodes, adapted", "inference", "training"], rows)
+
+
+def footprints() -> str:
+    """Return how well the region fits rectangles that turn, and which paths it holds."""
+    by_heatmap: dict[tuple[str, str], dict[str, Json]] = {}
+    for row in read("footprints.json")["rows"]:
+        by_heatmap.setdefault((row["tasks"], row["heatmap"]), {})[row["rectangle"]] = row
+    sides = ("1:1", "2:1", "4:1")
+    overlaps, paths = [], []
+    for (tasks, heatmap), rows in by_heatmap.items():
+        name = f"**{heatmap}**" if heatmap == "as shipped" else heatmap
+        slender = rows["4:1"]
+        ious = [spread(row["iou"], ".2f") for row in rows.values()]
+        shares = [f"{slender[score][0]:.2f}" for score in ("recall", "precision", "used")]
+        overlaps.append([tasks, name, *ious, *shares])
+        held = [spread([100 * share for share in row["within"]], ".0f") for row in rows.values()]
+        longer = "-" if slender["ratio"] is None else f"{100 * (slender['ratio'][0] - 1):.1f} %"
+        some = [f"{rows[side]['held'][0]:.0%}" for side in sides[1:]]
+        paths.append([tasks, name, *held, *some, longer])
+    header = ["tasks", "heat map"]
+    regions = [*(f"IoU, {side}" for side in sides), "recall, 4:1", "precision, 4:1", "used, 4:1"]
+    routes = [f"within 5 %, {side} (%)" for side in sides]
+    routes += ["any path, 2:1", "any path, 4:1", "longer, 4:1"]
+    return "\n\n".join((table([*header, *regions], overlaps), table([*header, *routes], paths)))
 
 
 def spread(interval: list[float], form: str) -> str:

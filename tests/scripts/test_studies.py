@@ -169,6 +169,26 @@ def test_generated_maps(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_footprints(tmp_path: Path) -> None:
+    pytest.importorskip("torch")
+    report = tmp_path / "footprints.json"
+    run_script(STUDIES / "footprints.py", "--tasks", "1", "--gaps", "1", "--json", str(report))
+    result = json.loads(report.read_text())
+    rows = {(row["tasks"], row["rectangle"], row["heatmap"]): row for row in result["rows"]}
+    assert len(rows) == 3 * 3 * 9
+    for group in ("random", "gaps", "border"):
+        for rectangle in ("1:1", "2:1", "4:1"):
+            everything = rows[group, rectangle, "all positions"]
+            assert everything["recall"] == everything["within"] == [1, 1, 1]
+            assert everything["ratio"][0] == pytest.approx(1)
+            assert rows[group, rectangle, "as shipped"]["difference"]["iou"] == [0, 0, 0]
+    # The slender rectangle does not get through where a disc of its width does.
+    assert rows["gaps", "4:1", "corridor"]["within"] == [0, 0, 0]
+    assert rows["border", "4:1", "border free"]["iou"][0] < 0.8
+    assert rows["border", "4:1", "as shipped"]["within"] == [1, 1, 1]
+
+
+@pytest.mark.slow
 def test_overlap(tmp_path: Path) -> None:
     pytest.importorskip("torch")
     rows, report = tmp_path / "rows.jsonl", tmp_path / "overlap.json"
