@@ -30,6 +30,7 @@ from typing import Any
 
 import numpy as np
 from pose_runs import PoseTask, make_setup, solve
+from run_rows import RunRows
 
 from cbagan_ompl import GridMap, HeadingSpread, Heatmap, Robot, attach, load_model
 from cbagan_ompl.common.files import write_json
@@ -83,17 +84,13 @@ def main() -> None:
     parser.add_argument("--json", metavar="FILE")
     args = parser.parse_args()
     ou.setLogLevel(ou.LOG_NONE)
-    rows = Path(args.rows)
-    done = [json.loads(line) for line in rows.read_text().splitlines()] if rows.exists() else []
-    known = {tuple(row["key"]) for row in done}
+    done = RunRows(args.rows)
     scenes = {name: load(args.folder, name) for name in TASKS}
     for run in runs(scenes, args.seeds):
-        if run not in known:
+        if run not in done.keys:
             tasks, robot = scenes[run[0]]
-            done.append({"key": run} | measure(tasks[run[1]], robot, run, args.time))
-            with rows.open("a") as file:
-                file.write(json.dumps(done[-1]) + "\n")
-    summary = summarise(done)
+            done.add(run, measure(tasks[run[1]], robot, run, args.time))
+    summary = summarise(done.rows)
     if args.hybrid is not None:
         for name, (tasks, robot) in scenes.items():
             summary.append(hybrid(name, tasks, robot, args))

@@ -11,11 +11,9 @@ line of ``--rows`` as soon as it has ended; a run that is there already is not d
 from __future__ import annotations
 
 import argparse
-import json
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from math import cos, inf, pi, sin
-from pathlib import Path
 from time import thread_time
 from typing import Any
 
@@ -24,6 +22,7 @@ from ompl import base as ob
 from ompl import control as oc
 from ompl import util as ou
 from pose_runs import PoseTask, generated_tasks, pose_task
+from run_rows import RunRows
 
 from cbagan_ompl import (
     GridMap,
@@ -83,22 +82,17 @@ def main() -> None:
     tasks = list(file_tasks(args) if args.maps else generated_tasks(args.count))
     predictor = load_model()
     predictor.predict(tasks[0].grid, tasks[0].start[:2], tasks[0].goal[:2])  # the first is slower
-    rows = Path(args.rows)
-    done = [json.loads(line) for line in rows.read_text().splitlines()] if rows.exists() else []
-    known = {tuple(row["key"]) for row in done}
+    done = RunRows(args.rows)
     for seed in range(args.seeds):
         for task in tasks:
             for car in args.cars.split(","):
                 for planner in args.planners.split(","):
                     for sampler in args.samplers.split(","):
                         key = (car, planner, sampler, task.name, seed)
-                        if key not in known:
-                            row = {"key": key, **measure(task, key, predictor, args)}
-                            done.append(row)
-                            with rows.open("a") as file:
-                                file.write(json.dumps(row) + "\n")
+                        if key not in done.keys:
+                            done.add(key, measure(task, key, predictor, args))
     names = {task.name for task in tasks}
-    summary = summarise([row for row in done if row["key"][3] in names], args.time)
+    summary = summarise([row for row in done.rows if row["key"][3] in names], args.time)
     for line in summary:
         print(line)
     if args.json is not None:

@@ -14,26 +14,22 @@ a line of ``--rows`` as soon as it has ended; a run that is there already is not
 from __future__ import annotations
 
 import argparse
-import json
 from collections import defaultdict
 from dataclasses import asdict, replace
 from itertools import product
 from math import inf
-from pathlib import Path
 from time import process_time
 from typing import Any
 
 import cv2
 import numpy as np
 from pose_runs import (
-    LENGTH,
-    SPACES,
-    WIDTH,
     PoseTask,
     generated_tasks,
-    make_setup,
+    seeded_setup,
     solve,
 )
+from run_rows import RunRows
 
 from cbagan_ompl import HeadingSpread, Heatmap, Predictor, Robot, TaskError, attach, load_model
 from cbagan_ompl.common.files import write_json
@@ -69,19 +65,15 @@ def main() -> None:
     args = parser.parse_args()
     ou.setLogLevel(ou.LOG_NONE)
     predictor = load_model()
-    rows = Path(args.rows)
-    done = [json.loads(line) for line in rows.read_text().splitlines()] if rows.exists() else []
-    known = {tuple(row["key"]) for row in done}
+    done = RunRows(args.rows)
     tasks = list(generated_tasks(args.count))
     runs = product(args.planners.split(","), range(args.seeds), range(len(tasks)), UNUSED)
     for planner, seed, number, space in runs:
         for way in ways_of(space):
             key = space, planner, way, number, seed
-            if key not in known:
-                done.append({"key": key, **measure(tasks[number], key, predictor, args.time)})
-                with rows.open("a") as file:
-                    file.write(json.dumps(done[-1]) + "\n")
-    summary = summarise(done, args.time)
+            if key not in done.keys:
+                done.add(key, measure(tasks[number], key, predictor, args.time))
+    summary = summarise(done.rows, args.time)
     for row in summary:
         print(row)
     defaults = asdict(HeadingSpread())
@@ -106,9 +98,7 @@ def measure(
     """Return the time until the first path; None without one."""
     space, planner, way, number, repetition = key
     seed = number + 1000 * repetition
-    robot = Robot.rectangle(LENGTH, WIDTH, **SPACES[space])
-    compat.seed_ompl(seed + 1)
-    setup = make_setup(task, robot, planner)
+    robot, setup = seeded_setup(task, space, planner, seed)
     if way == OWN:
         return {"first": first(solve(setup, limit, True), 0.0)}
     began = process_time()

@@ -87,6 +87,13 @@ def make_setup(
     return setup
 
 
+def seeded_setup(task: PoseTask, space: str, planner: str, seed: int) -> tuple[Robot, Any]:
+    """Return the rectangle of the studies in a space, and a setup for it, with OMPL seeded."""
+    robot = Robot.rectangle(LENGTH, WIDTH, **SPACES[space])
+    compat.seed_ompl(seed + 1)
+    return robot, make_setup(task, robot, planner)
+
+
 def make_state(space: Any, pose: tuple[float, float, float]) -> Any:
     state = compat.new_state(space)
     typed = compat.typed_state(state)

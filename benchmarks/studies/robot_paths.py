@@ -27,18 +27,17 @@ in the order of their seeds, and the summary takes the seeds of which all runs h
 from __future__ import annotations
 
 import argparse
-import json
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import inf
-from pathlib import Path
 from time import process_time
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pose_runs import SPACES, PoseTask, make_setup, pose_task, solve
+from run_rows import RunRows
 from scipy.ndimage import distance_transform_edt
 
 from cbagan_ompl import (
@@ -95,22 +94,17 @@ def main() -> None:
     tasks = [task for word in args.maps for task in tasks_on(word, args.tasks)]
     for _, task, robot in tasks:
         print(f"{task.name}: {task.length:.0f}, detour {task.detour:.2f}, {robot!r}")
-    rows = Path(args.rows)
-    done = [json.loads(line) for line in rows.read_text().splitlines()] if rows.exists() else []
-    known = {tuple(row["key"]) for row in done}
+    done = RunRows(args.rows)
     plan = list(runs(args, tasks))
     if not args.summary_only:
         predictor = load_model()
         warm_up(predictor)
         for run in plan:
-            if run.key not in known:
-                done.append({"key": run.key, **measure(run, predictor, args.time)})
-                with rows.open("a") as file:
-                    file.write(json.dumps(done[-1]) + "\n")
-    known = {tuple(row["key"]) for row in done}
-    missing = {run.key[-1] for run in plan if run.key not in known}
+            if run.key not in done.keys:
+                done.add(run.key, measure(run, predictor, args.time))
+    missing = {run.key[-1] for run in plan if run.key not in done.keys}
     seeds = min(missing, default=args.seeds)
-    result = summarise([row for row in done if row["key"][-1] < seeds], args.time)
+    result = summarise([row for row in done.rows if row["key"][-1] < seeds], args.time)
     for row in result["rows"]:
         print(row)
     head = {"ompl": compat.ompl_version(), "time": args.time, "seeds": seeds}

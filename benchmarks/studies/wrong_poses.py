@@ -15,18 +15,18 @@ is there already is not done again.
 from __future__ import annotations
 
 import argparse
-import json
 from collections import defaultdict
 from itertools import product
 from math import pi
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pose_runs import LENGTH, SPACES, WIDTH, PoseTask, generated_tasks, make_setup, solve
+from pose_runs import PoseTask, generated_tasks, seeded_setup, solve
+from run_rows import RunRows
 
-from cbagan_ompl import Heatmap, Predictor, Robot, attach, load_model
+from cbagan_ompl import Heatmap, Predictor, attach, load_model
 from cbagan_ompl.common.files import write_json
+from cbagan_ompl.evaluation.bootstrap import percentile_interval
 from cbagan_ompl.planning import compat
 from cbagan_ompl.planning.compat import ou
 
@@ -59,20 +59,14 @@ def main() -> None:
     args = parser.parse_args()
     ou.setLogLevel(ou.LOG_NONE)
     predictor = load_model()
-    rows = Path(args.rows)
-    lines = rows.read_text().splitlines() if rows.exists() else []
-    times: dict[Key, float | None] = {
-        tuple(row["key"]): row["first"] for row in map(json.loads, lines)
-    }
+    done = RunRows(args.rows)
     tasks = list(generated_tasks(args.count))
     runs = product(range(args.seeds), range(len(tasks)), ROBOTS, PLANNERS, KINDS)
     for seed, number, space, planner, kind in runs:
         key = space, planner, kind, number, seed
-        if key not in times:
-            times[key] = measure(tasks[number], key, predictor, args.time)
-            with rows.open("a") as file:
-                file.write(json.dumps({"key": key, "first": times[key]}) + "\n")
-    summary = summarise(times, args.time)
+        if key not in done.keys:
+            done.add(key, {"first": measure(tasks[number], key, predictor, args.time)})
+    summary = summarise({tuple(row["key"]): row["first"] for row in done.rows}, args.time)
     for row in summary:
         print(row)
     if args.json is not None:
@@ -84,9 +78,7 @@ def measure(task: PoseTask, key: Key, predictor: Predictor, limit: float) -> flo
     """Return the seconds until the first path; None without one."""
     space, planner, kind, number, repetition = key
     seed = number + 1000 * repetition
-    robot = Robot.rectangle(LENGTH, WIDTH, **SPACES[space])
-    compat.seed_ompl(seed + 1)
-    setup = make_setup(task, robot, planner)
+    robot, setup = seeded_setup(task, space, planner, seed)
     if kind == OWN:
         costs = solve(setup, limit, True)
     else:
@@ -141,7 +133,7 @@ def interval(by_task: dict[int, list[float]]) -> list[float]:
     """Return the geometric mean of ratios, and its bootstrap interval of 95 % over tasks."""
     means = np.array([np.mean(logs) for logs in by_task.values()])
     picks = np.random.default_rng(0).integers(len(means), size=(RESAMPLES, len(means)))
-    low, high = np.percentile(means[picks].mean(axis=1), (2.5, 97.5))
+    low, high = percentile_interval(means[picks].mean(axis=1))
     return [round(float(np.exp(value)), 2) for value in (means.mean(), low, high)]
 
 

@@ -10,7 +10,7 @@ from ..errors import MapError
 
 
 def erode(
-    free: NDArray[np.bool_], radius: float, resolution: float, name: str, border: bool = False
+    free: NDArray[np.bool_], radius: float, resolution: float, name: str, border: bool
 ) -> NDArray[np.bool_]:
     """Return the pixels that are a distance away from every blocked pixel, square to square.
 

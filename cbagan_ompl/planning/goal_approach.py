@@ -6,12 +6,12 @@ from collections.abc import Callable
 from math import cos, pi, sin
 from typing import Any
 
-from ..robots.arcs import follow_arc
+from ..robots.arcs import Pose, follow_arc
 from ..sampling.headings import FOLLOWING
 from ..sampling.sampler import HeatmapSampler
 from .compat import new_state, typed_state
-from .planner_kinds import plans_controls
 from .problem import range_of
+from .sample_budget import needs_many_poses
 from .states import drives_backwards, has_turning_radius, pose_space, state_access
 
 # Lengths of the shortest curves that turn a robot by pi in place, in turning radii.
@@ -23,7 +23,6 @@ _MOST_TRIES = 10
 # How near to the goal a tree is for its samples to be poses before it, in ranges.
 _NEAR = 2.0
 
-Pose = tuple[float, float, float]
 #: Moves a pose back along a motion that ends in it, at random.
 StepBack = Callable[[Pose], Pose]
 
@@ -115,11 +114,11 @@ def goal_approach(planner: Any, sampler: HeatmapSampler) -> GoalApproach | None:
         None where states are no poses, where the planner plans controls, and where the approach is
         switched off, by itself or with all headings.
     """
-    space, spread = planner.getSpaceInformation().getStateSpace(), sampler.spread
-    longest = range_of(planner)
+    spread = sampler.spread
     is_on = spread.approach_fraction > 0 and spread.uniform_fraction < 1
-    if not is_on or pose_space(space) is None or plans_controls(planner):
+    if not is_on or not needs_many_poses(planner):
         return None
+    space, longest = planner.getSpaceInformation().getStateSpace(), range_of(planner)
     if has_turning_radius(space):
         step_back = _arc_back(turning_radius(space), drives_backwards(space), sampler.chance)
     else:

@@ -145,9 +145,10 @@ class InjectedGoal(ob.GoalSampleableRegion):  # type: ignore[misc]
         return extension.move(state)
 
     def _take(self, sampler: HeatmapSampler) -> None:
+        planner = self._monitor.setup.getPlanner()
         self._sampler = sampler
-        self._approach = goal_approach(self._monitor.setup.getPlanner(), sampler)
-        self._extension = pose_extension(self._monitor.setup.getPlanner(), sampler)
+        self._approach = goal_approach(planner, sampler)
+        self._extension = pose_extension(planner, sampler)
 
     def _follow(self, sampler: HeatmapSampler, states: StateAccess) -> None:
         """Sample a heat map from now on."""

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from math import cos, pi, sin
 
+#: (x, y, yaw), radians.
+Pose = tuple[float, float, float]
 
-def follow_arc(
-    x: float, y: float, yaw: float, length: float, curvature: float
-) -> tuple[float, float, float]:
+
+def follow_arc(x: float, y: float, yaw: float, length: float, curvature: float) -> Pose:
     """Return the pose at the end of an arc of circle.
 
     Args:

@@ -101,7 +101,7 @@ class HeadingSpread:
         reverse_fraction: fraction of the other samples whose heading is turned by pi, from 0 to 1,
             for robots that drive backwards as well (ReedsSheppStateSpace).
         approach_fraction: fraction of a planner's samples, from 0 to 1, once its tree is within
-            its range of the goal and before its first path, that are poses from which the goal is
+            two ranges of the goal and before its first path, that are poses from which the goal is
             reached in one motion, where goal injection reaches the planner. None if all headings
             are uniform.
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.compilation import compiled
+from ..robots.arcs import Pose
 from .heatmap import Heatmap
 
 # Nodes for which there is room at first.
@@ -18,8 +19,6 @@ _FIRST_ROOM = 256
 TRIES = 512
 #: The shortest motion that is tried, as a fraction of the longest.
 SHORTEST = 0.1
-
-Pose = tuple[float, float, float]
 
 
 class TreeExtension(ABC):

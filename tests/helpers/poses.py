@@ -7,11 +7,10 @@ from typing import Any
 
 from cbagan_ompl.planning import compat
 from cbagan_ompl.planning.compat import ob, og
+from cbagan_ompl.robots.arcs import Pose
 
 SIDE, RADIUS = 128, 6.0
 POSE_SPACES = ("SE2", "Dubins", "ReedsShepp")
-
-Pose = tuple[float, float, float]
 
 
 def make_space(kind: str, radius: float = RADIUS) -> Any:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers.poses import POSE_SPACES, RADIUS, SIDE, Pose, make_setup, make_space, new_pose
+from helpers.poses import POSE_SPACES, RADIUS, SIDE, make_setup, make_space, new_pose
 from helpers.setups import solve_for
 from ompl import control as oc
 
@@ -16,7 +16,7 @@ from cbagan_ompl.planning import compat
 from cbagan_ompl.planning.compat import ob, og, ou
 from cbagan_ompl.planning.goal_approach import GoalApproach, goal_approach, turning_radius
 from cbagan_ompl.planning.sample_budget import budget_of
-from cbagan_ompl.robots.arcs import follow_arc
+from cbagan_ompl.robots.arcs import Pose, follow_arc
 from cbagan_ompl.sampling.budget import ADVANCE, EARNED_BY_UNIFORM_POSE
 from cbagan_ompl.sampling.sampler import HeatmapSampler
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from cbagan_ompl import GridMap, Heatmap
+from cbagan_ompl.robots.arcs import Pose
 from cbagan_ompl.sampling.arc_extension import ArcExtension
 from cbagan_ompl.sampling.headings import FOLLOWING
 from cbagan_ompl.sampling.line_extension import LineExtension
@@ -18,7 +19,6 @@ GRID = GridMap(np.ones((SIDE, SIDE), bool))
 NODE = (32.0, 32.0, 0.5)
 WEIGHTS = (1.0, 0.5)
 KINDS = ["arcs", "lines"]
-Pose = tuple[float, float, float]
 
 
 def make_extension(kind: str, heatmap: Heatmap, spread: float = 0.4) -> TreeExtension:
