@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from statistics import median
 
-from robot_tables import quartile_cell
 from suite_tables import VERSIONS, Json, read
 
 from cbagan_ompl.common.markdown import table
