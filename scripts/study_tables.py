@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from statistics import median
 
+from robot_tables import quartile_cell
 from suite_tables import VERSIONS, Json, read
 
 from cbagan_ompl.common.markdown import table
@@ -29,8 +30,7 @@ def control() -> str:
 
 
 def control_cells(row: Json) -> list[str]:
-    quartiles = " / ".join("-" if q is None else f"{q:.0f}" for q in row["first_ms"])
-    return [f"{row['solved']:.0%}", quartiles, f"{row['ratio']:.2f}"]
+    return [f"{row['solved']:.0%}", quartile_cell(row["first_ms"]), f"{row['ratio']:.2f}"]
 
 
 def overlap() -> str:
